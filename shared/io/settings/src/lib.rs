@@ -1,0 +1,1 @@
+//! Configuration in TOML: declared once, checked, explained.

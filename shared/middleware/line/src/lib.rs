@@ -1,0 +1,1 @@
+//! The framed serial protocol between host and vehicle.

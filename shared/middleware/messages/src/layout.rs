@@ -1,0 +1,120 @@
+//! The description of a layout, made by the same lines that declare the message.
+
+/// A primitive as it lies in memory and in CDR.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Unsigned 8 bit.
+    U8,
+    /// Signed 8 bit.
+    I8,
+    /// Unsigned 16 bit.
+    U16,
+    /// Unsigned 32 bit.
+    U32,
+    /// Unsigned 64 bit.
+    U64,
+    /// Signed 64 bit.
+    I64,
+    /// IEEE double.
+    F64,
+    /// Another layout.
+    Nested(&'static Layout),
+}
+
+/// A field of a layout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Name.
+    pub name: &'static str,
+    /// What one element is.
+    pub kind: Kind,
+    /// How many elements; none for a single value.
+    pub count: Option<usize>,
+    /// Bytes from the layout's beginning.
+    pub offset: usize,
+    /// What it means, with unit.
+    pub doc: &'static str,
+}
+
+/// A message or a part of one.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Name, as in schemas: `Raw`.
+    pub name: &'static str,
+    /// Size in bytes.
+    pub size: usize,
+    /// Its fields in order, without gaps.
+    pub fields: &'static [Field],
+}
+
+/// A type that may be a field.
+pub trait Element {
+    /// What one element is.
+    const KIND: Kind;
+    /// How many; none for a single value.
+    const COUNT: Option<usize> = None;
+}
+
+macro_rules! primitive {
+    ($($type:ty => $kind:ident),* $(,)?) => {
+        $(impl Element for $type { const KIND: Kind = Kind::$kind; })*
+    };
+}
+
+primitive! { u8 => U8, i8 => I8, u16 => U16, u32 => U32, u64 => U64, i64 => I64, f64 => F64 }
+
+impl<T: Element, const N: usize> Element for [T; N] {
+    const KIND: Kind = T::KIND;
+    // Arrays of arrays lie flat in memory and in CDR.
+    const COUNT: Option<usize> = match T::COUNT {
+        Some(inner) => Some(N * inner),
+        None => Some(N),
+    };
+}
+
+/// A type that describes itself.
+pub trait Described {
+    /// Its description.
+    const LAYOUT: &'static Layout;
+}
+
+/// Declares a plain struct together with its description; a padding byte is a compile error.
+macro_rules! layout {
+    ($(#[doc = $doc:literal])+ pub struct $name:ident {
+        $($(#[doc = $field_doc:literal])+ pub $field:ident: $type:ty,)+
+    }) => {
+        $(#[doc = $doc])+
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+        pub struct $name {
+            $($(#[doc = $field_doc])+ pub $field: $type,)+
+        }
+
+        impl $crate::layout::Described for $name {
+            const LAYOUT: &'static $crate::layout::Layout = &$crate::layout::Layout {
+                name: stringify!($name),
+                size: core::mem::size_of::<$name>(),
+                fields: &[$($crate::layout::Field {
+                    name: stringify!($field),
+                    kind: <$type as $crate::layout::Element>::KIND,
+                    count: <$type as $crate::layout::Element>::COUNT,
+                    offset: core::mem::offset_of!($name, $field),
+                    doc: concat!($($field_doc),+),
+                }),+],
+            };
+        }
+
+        impl $crate::layout::Element for $name {
+            const KIND: $crate::layout::Kind =
+                $crate::layout::Kind::Nested(<$name as $crate::layout::Described>::LAYOUT);
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                bytemuck::Zeroable::zeroed()
+            }
+        }
+    };
+}
+
+pub(crate) use layout;

@@ -1,0 +1,1 @@
+//! Ports, waiting, heartbeats: the only crate that knows iceoryx2.

@@ -1,0 +1,1 @@
+//! The nominal vehicle as a simulator.

@@ -1,0 +1,15 @@
+//! Poses, polygons, the vehicle's shape, and the one door to transcendental functions.
+//!
+//! Frames are right-handed: x forward, y left, yaw counter-clockwise. The body frame sits at the centre of the
+//! rear axle, on the ground. Lengths are metres, angles radians.
+
+pub mod angle;
+pub mod math;
+mod pose;
+mod vehicle;
+
+pub use pose::Pose;
+pub use vehicle::{
+    Actuators, Drive, Encoders, Footprint, Gyro, Limits, Reference, SteeringSensor, Vehicle,
+    WHEELS, Wheel,
+};

@@ -1,0 +1,5 @@
+//! Modes, supervision, permits and the actuation gate as pure decisions.
+
+mod settings;
+
+pub use settings::{RestartSettings, SafetySettings, Timeouts};

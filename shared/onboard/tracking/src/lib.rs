@@ -1,0 +1,5 @@
+//! Trajectory tracking control.
+
+mod settings;
+
+pub use settings::TrackerSettings;
