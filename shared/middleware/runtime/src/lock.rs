@@ -1,0 +1,106 @@
+//! Locks that die with their holder.
+
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Seek, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{FlockOperation, flock};
+
+/// Why a lock was not taken.
+#[derive(Debug, thiserror::Error)]
+pub enum LockError {
+    /// Another process has it.
+    #[error("{path} is held by process {pid}")]
+    Held {
+        /// The lock.
+        path: PathBuf,
+        /// Who has it, as far as it says so.
+        pid: u32,
+    },
+    /// The file could not be used.
+    #[error("{path}: {source}")]
+    File {
+        /// The lock.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// An exclusive lock on a file that holds the owner's pid; the kernel releases it at the owner's death.
+#[derive(Debug)]
+pub struct FileLock {
+    file: File,
+    path: PathBuf,
+}
+
+impl FileLock {
+    /// Takes the lock and writes our pid into the file.
+    ///
+    /// # Errors
+    /// [`LockError::Held`] where another process has it, [`LockError::File`] where the file cannot be used.
+    pub fn take(path: &Path) -> Result<Self, LockError> {
+        let wrap = |source| LockError::File { path: path.to_owned(), source };
+        let mut file = open(path).map_err(wrap)?;
+        if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
+            return Err(LockError::Held { path: path.to_owned(), pid: pid_in(&mut file) });
+        }
+        file.set_len(0).map_err(wrap)?;
+        file.write_all(std::process::id().to_string().as_bytes()).map_err(wrap)?;
+        Ok(Self { file, path: path.to_owned() })
+    }
+
+    /// The pid of the process that holds the lock at `path`; none where nobody does.
+    #[must_use]
+    pub fn holder(path: &Path) -> Option<u32> {
+        let mut file = OpenOptions::new().read(true).open(path).ok()?;
+        match flock(&file, FlockOperation::NonBlockingLockShared) {
+            Ok(()) => None,
+            Err(_) => Some(pid_in(&mut file)).filter(|pid| *pid != 0),
+        }
+    }
+
+    /// The locked file's path.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for FileLock {
+    fn drop(&mut self) {
+        // The pid goes before the lock does, so that nobody reads a pid that may be somebody else's by then.
+        let _ = self.file.set_len(0);
+    }
+}
+
+fn open(path: &Path) -> std::io::Result<File> {
+    OpenOptions::new().read(true).write(true).create(true).truncate(false).mode(0o600).open(path)
+}
+
+fn pid_in(file: &mut File) -> u32 {
+    let mut text = String::new();
+    let _ = file.rewind().and_then(|()| file.read_to_string(&mut text));
+    text.trim().parse().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lock_is_exclusive_and_ends_with_its_holder() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.lock");
+        assert_eq!(FileLock::holder(&path), None);
+        let lock = FileLock::take(&path).unwrap();
+        assert_eq!(FileLock::holder(&path), Some(std::process::id()));
+        assert!(
+            matches!(FileLock::take(&path), Err(LockError::Held { pid, .. }) if pid == std::process::id())
+        );
+        drop(lock);
+        assert_eq!(FileLock::holder(&path), None);
+        FileLock::take(&path).unwrap();
+    }
+}

@@ -1,0 +1,29 @@
+//! Processes as the supervisor handles them.
+
+use rustix::process::{Pid, Signal, kill_process};
+
+/// Marks every descriptor above the standard three as closed on exec: those of the middleware are not, and a child
+/// must not keep its parent's sockets and locks open. Call it right before spawning.
+pub fn close_inherited_on_exec() {
+    // SAFETY: the call sets a flag on descriptors of this process; it closes none and touches no memory.
+    unsafe {
+        libc::close_range(3, libc::c_uint::MAX, libc::CLOSE_RANGE_CLOEXEC.cast_signed());
+    }
+}
+
+/// Asks a process to end.
+pub fn terminate(pid: u32) {
+    signal(pid, Signal::TERM);
+}
+
+/// Ends a process, stopped or not.
+pub fn kill(pid: u32) {
+    signal(pid, Signal::KILL);
+}
+
+fn signal(pid: u32, signal: Signal) {
+    if let Some(pid) = i32::try_from(pid).ok().and_then(Pid::from_raw) {
+        // A process that is gone already is what was wanted.
+        let _ = kill_process(pid, signal);
+    }
+}

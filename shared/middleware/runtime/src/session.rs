@@ -1,0 +1,297 @@
+//! A process's part in an instance: it opens what the supervisor created.
+
+use iceoryx2::prelude::{
+    Config, FilePath, Node, NodeBuilder, NodeName, SemanticString, SignalHandlingMode, ipc,
+};
+use iceoryx2::service::builder::event::EventOpenError;
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
+use iceoryx2::service::builder::request_response::RequestResponseOpenError;
+use kerbside_messages::{Message, Plan, Process};
+
+use crate::error::{Context, RuntimeError};
+use crate::publisher::{PlanPublisher, Publisher};
+use crate::request::{Client, Server};
+use crate::services::service_name;
+use crate::subscriber::{PlanSubscriber, Subscriber};
+use crate::wait::{Listener, Notifier};
+use crate::wire::{Wire, WirePoint};
+use crate::{Instance, InstanceError};
+
+/// Why a process cannot take part.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// The instance itself.
+    #[error(transparent)]
+    Instance(InstanceError),
+    /// Not there yet: wait for it.
+    #[error("{what} of instance {instance} is not there yet")]
+    Missing {
+        /// What is awaited.
+        what: String,
+        /// Of which instance.
+        instance: String,
+    },
+    /// The other side was built from other layouts.
+    #[error(
+        "topic {topic}: the running stack has another layout of {ours}; stop it and start one build everywhere"
+    )]
+    Incompatible {
+        /// Which topic.
+        topic: &'static str,
+        /// The type name of this build.
+        ours: &'static str,
+    },
+    /// The middleware refused.
+    #[error(transparent)]
+    Middleware(#[from] RuntimeError),
+}
+
+impl SessionError {
+    /// Whether waiting may help.
+    #[must_use]
+    pub fn is_missing(&self) -> bool {
+        matches!(self, Self::Missing { .. })
+    }
+}
+
+/// A node of the middleware, and the ports made from it. It belongs to one thread.
+pub struct Session {
+    node: Node<ipc::Service>,
+    instance: Instance,
+}
+
+impl core::fmt::Debug for Session {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Session").field("instance", &self.instance.name()).finish_non_exhaustive()
+    }
+}
+
+impl Session {
+    /// Joins an instance as `process`.
+    ///
+    /// # Errors
+    /// [`SessionError::Missing`] as long as no supervisor has set the instance up.
+    pub fn join(instance: &Instance, process: Process) -> Result<Self, SessionError> {
+        if !instance.configuration().exists() {
+            return Err(SessionError::Missing {
+                what: "the supervisor".to_owned(),
+                instance: instance.name().to_owned(),
+            });
+        }
+        Self::start(instance, process)
+    }
+
+    pub(crate) fn start(instance: &Instance, process: Process) -> Result<Self, SessionError> {
+        let file = instance.configuration();
+        let file = FilePath::new(file.as_os_str().as_encoded_bytes())
+            .context("name configuration", "all")?;
+        // The clean-up of half-created nodes looks at the process-wide configuration, not at the node's.
+        Config::setup_global_config_from_file(&file).context("read configuration", "all")?;
+        let name = NodeName::new(process.name()).context("name node", "all")?;
+        let node = NodeBuilder::new()
+            .name(&name)
+            .config(&instance.middleware_config()?)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .context("create node", "all")?;
+        Ok(Self { node, instance: instance.clone() })
+    }
+
+    /// The instance.
+    #[must_use]
+    pub fn instance(&self) -> &Instance {
+        &self.instance
+    }
+
+    pub(crate) fn node(&self) -> &Node<ipc::Service> {
+        &self.node
+    }
+
+    /// A publisher of `M`; of `process`'s own service for topics of which each process has one.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn publisher<M: Message>(
+        &self,
+        process: Option<Process>,
+    ) -> Result<Publisher<M>, SessionError> {
+        let factory = self
+            .node
+            .service_builder(&service_name(M::TOPIC, process)?)
+            .publish_subscribe::<Wire<M>>()
+            .open()
+            .map_err(|error| self.publish_subscribe_error::<M>(error))?;
+        let port = factory
+            .publisher_builder()
+            .max_loaned_samples(2)
+            .create()
+            .context("create publisher", M::TOPIC.name)?;
+        let notifier = M::TOPIC.wakes.map(|_| self.notifier::<M>()).transpose()?;
+        Ok(Publisher::new(port, notifier))
+    }
+
+    /// A subscriber of `M` that keeps up to `buffer` samples.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn subscriber<M: Message>(
+        &self,
+        process: Option<Process>,
+        buffer: usize,
+    ) -> Result<Subscriber<M>, SessionError> {
+        let factory = self
+            .node
+            .service_builder(&service_name(M::TOPIC, process)?)
+            .publish_subscribe::<Wire<M>>()
+            .open()
+            .map_err(|error| self.publish_subscribe_error::<M>(error))?;
+        let port = factory
+            .subscriber_builder()
+            .buffer_size(buffer)
+            .create()
+            .context("create subscriber", M::TOPIC.name)?;
+        Ok(Subscriber::new(port))
+    }
+
+    /// The publisher of plans.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn plan_publisher(&self) -> Result<PlanPublisher, SessionError> {
+        let factory = self
+            .node
+            .service_builder(&service_name(Plan::TOPIC, None)?)
+            .publish_subscribe::<[WirePoint]>()
+            .user_header::<Wire<Plan>>()
+            .open()
+            .map_err(|error| self.publish_subscribe_error::<Plan>(error))?;
+        let port = factory
+            .publisher_builder()
+            .initial_max_slice_len(kerbside_messages::MAX_PLAN_POINTS)
+            .create()
+            .context("create publisher", Plan::TOPIC.name)?;
+        Ok(PlanPublisher::new(port))
+    }
+
+    /// A subscriber of plans.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn plan_subscriber(&self) -> Result<PlanSubscriber, SessionError> {
+        let factory = self
+            .node
+            .service_builder(&service_name(Plan::TOPIC, None)?)
+            .publish_subscribe::<[WirePoint]>()
+            .user_header::<Wire<Plan>>()
+            .open()
+            .map_err(|error| self.publish_subscribe_error::<Plan>(error))?;
+        let port = factory
+            .subscriber_builder()
+            .buffer_size(1)
+            .create()
+            .context("create subscriber", Plan::TOPIC.name)?;
+        Ok(PlanSubscriber::new(port))
+    }
+
+    /// The server that answers `Q` with `A`.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn server<Q: Message, A: Message>(&self) -> Result<Server<Q, A>, SessionError> {
+        let factory = self
+            .node
+            .service_builder(&service_name(Q::TOPIC, None)?)
+            .request_response::<Wire<Q>, Wire<A>>()
+            .open()
+            .map_err(|error| self.request_response_error::<Q>(error))?;
+        let port = factory.server_builder().create().context("create server", Q::TOPIC.name)?;
+        Ok(Server::new(port))
+    }
+
+    /// A client that asks `Q` and is answered `A`.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn client<Q: Message, A: Message>(&self) -> Result<Client<Q, A>, SessionError> {
+        let factory = self
+            .node
+            .service_builder(&service_name(Q::TOPIC, None)?)
+            .request_response::<Wire<Q>, Wire<A>>()
+            .open()
+            .map_err(|error| self.request_response_error::<Q>(error))?;
+        let port = factory.client_builder().create().context("create client", Q::TOPIC.name)?;
+        Ok(Client::new(port, self.notifier::<Q>()?))
+    }
+
+    /// The listener that samples of `M` wake.
+    ///
+    /// # Errors
+    /// [`SessionError`].
+    pub fn listener<M: Message>(&self) -> Result<Listener, SessionError> {
+        let factory = self
+            .node
+            .service_builder(&service_name(M::TOPIC, None)?)
+            .event()
+            .open()
+            .map_err(|error| self.event_error::<M>(error))?;
+        Ok(Listener::new(
+            factory.listener_builder().create().context("create listener", M::TOPIC.name)?,
+            M::TOPIC.name,
+        ))
+    }
+
+    fn notifier<M: Message>(&self) -> Result<Notifier, SessionError> {
+        let factory = self
+            .node
+            .service_builder(&service_name(M::TOPIC, None)?)
+            .event()
+            .open()
+            .map_err(|error| self.event_error::<M>(error))?;
+        Ok(Notifier::new(
+            factory.notifier_builder().create().context("create notifier", M::TOPIC.name)?,
+        ))
+    }
+
+    fn missing<M: Message>(&self) -> SessionError {
+        SessionError::Missing {
+            what: format!("topic {}", M::TOPIC.name),
+            instance: self.instance.name().to_owned(),
+        }
+    }
+
+    fn publish_subscribe_error<M: Message>(
+        &self,
+        error: PublishSubscribeOpenError,
+    ) -> SessionError {
+        match error {
+            PublishSubscribeOpenError::DoesNotExist => self.missing::<M>(),
+            PublishSubscribeOpenError::IncompatibleTypes => {
+                SessionError::Incompatible { topic: M::TOPIC.name, ours: M::TYPE_NAME }
+            }
+            other => SessionError::Middleware(RuntimeError::of("open service", M::TOPIC.name)(
+                Box::new(other),
+            )),
+        }
+    }
+
+    fn request_response_error<M: Message>(&self, error: RequestResponseOpenError) -> SessionError {
+        match error {
+            RequestResponseOpenError::DoesNotExist => self.missing::<M>(),
+            RequestResponseOpenError::IncompatibleRequestOrResponseType => {
+                SessionError::Incompatible { topic: M::TOPIC.name, ours: M::TYPE_NAME }
+            }
+            other => SessionError::Middleware(RuntimeError::of("open service", M::TOPIC.name)(
+                Box::new(other),
+            )),
+        }
+    }
+
+    fn event_error<M: Message>(&self, error: EventOpenError) -> SessionError {
+        match error {
+            EventOpenError::DoesNotExist => self.missing::<M>(),
+            other => SessionError::Middleware(RuntimeError::of("open event", M::TOPIC.name)(
+                Box::new(other),
+            )),
+        }
+    }
+}
