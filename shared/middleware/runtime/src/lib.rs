@@ -4,7 +4,7 @@
 //!
 //! - One long-lived process, the supervisor, creates every service and holds the factories ([`Services`]); all others
 //!   only open them ([`Session`]). A process killed while it creates a service would leave it unopenable for good.
-//! - Dead nodes are swept by the supervisor alone ([`Services::sweep`]): a sweep takes milliseconds.
+//! - Dead nodes are swept by the supervisor alone ([`Session::sweep`]): a sweep takes milliseconds.
 //! - Safe overflow everywhere: a stopped subscriber must never block its publisher.
 //! - A notification is a hint; the sample is in the queue. Every wait is bounded.
 //! - The prefix and root path of an instance are set for the process as well as for its nodes: the clean-up of
@@ -34,9 +34,9 @@ pub use lock::{FileLock, LockError};
 pub use process::{close_inherited_on_exec, kill, terminate};
 pub use publisher::{PlanPublisher, Publisher};
 pub use realtime::{RealtimeReport, RealtimeRequest, enter_realtime};
-pub use request::{Asked, Client, Server};
-pub use services::{Services, SweepReport};
-pub use session::{Session, SessionError};
+pub use request::{Asked, Client, Pending, Server};
+pub use services::Services;
+pub use session::{Session, SessionError, SweepReport};
 pub use subscriber::{Newest, PlanSubscriber, Received, Standing, Subscriber};
 pub use wait::{Listener, Notifier, poll_readable};
 

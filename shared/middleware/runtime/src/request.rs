@@ -3,6 +3,7 @@
 use core::time::Duration;
 
 use iceoryx2::active_request::ActiveRequest;
+use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::client::Client as ClientPort;
 use iceoryx2::port::server::Server as ServerPort;
 use iceoryx2::prelude::ipc;
@@ -84,28 +85,54 @@ impl<Q: Message, A: Message> Client<Q, A> {
         Self { port, notifier }
     }
 
-    /// Sends `request` and waits for its answer, at most `patience`; none where nobody answered in time.
+    /// Sends `request`; its answer is looked for with [`Pending::poll`].
     ///
     /// # Errors
     /// [`RuntimeError`] where the request cannot be sent.
-    pub fn ask(&self, mut request: Q, patience: Duration) -> Result<Option<A>, RuntimeError> {
+    pub fn send(&self, mut request: Q) -> Result<Pending<Q, A>, RuntimeError> {
         let sent = now();
         seal(&mut request, &[], sent, 1, sent);
         let pending = self.port.send_copy(Wire(request)).context("send", Q::TOPIC.name)?;
         self.notifier.notify();
-        let deadline: Nanos = sent + u64::try_from(patience.as_nanos()).unwrap_or(u64::MAX / 2);
-        let mut admission = Admission::<A>::default();
+        Ok(Pending { pending, admission: Admission::default() })
+    }
+
+    /// Sends `request` and waits for its answer, at most `patience`; none where nobody answered in time.
+    ///
+    /// # Errors
+    /// [`RuntimeError`] where the request cannot be sent.
+    pub fn ask(&self, request: Q, patience: Duration) -> Result<Option<A>, RuntimeError> {
+        let deadline: Nanos = now() + u64::try_from(patience.as_nanos()).unwrap_or(u64::MAX / 2);
+        let mut pending = self.send(request)?;
         let mut poll = Ticker::new(Duration::from_millis(1));
         while now() < deadline {
-            if let Some(response) = pending.receive().context("receive", A::TOPIC.name)? {
-                let answer = response.payload().0;
-                if admission.admit(&answer, &[], now()).is_ok() {
-                    return Ok(Some(answer));
-                }
+            if let Some(answer) = pending.poll() {
+                return Ok(Some(answer));
             }
             poll.wait();
         }
         Ok(None)
+    }
+}
+
+/// A request on its way.
+pub struct Pending<Q: Message, A: Message> {
+    pending: PendingResponse<ipc::Service, Wire<Q>, (), Wire<A>, ()>,
+    admission: Admission<A>,
+}
+
+impl<Q: Message, A: Message> Pending<Q, A> {
+    /// The answer, once it is there.
+    pub fn poll(&mut self) -> Option<A> {
+        let response = self.pending.receive().ok()??;
+        let answer = response.payload().0;
+        self.admission.admit(&answer, &[], now()).is_ok().then_some(answer)
+    }
+}
+
+impl<Q: Message, A: Message> core::fmt::Debug for Pending<Q, A> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "Pending({})", Q::TOPIC.name)
     }
 }
 

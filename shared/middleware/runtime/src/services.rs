@@ -1,7 +1,6 @@
 //! The services of an instance, as the supervisor creates and keeps them.
 
 use core::any::Any;
-use core::time::Duration;
 
 use iceoryx2::prelude::{CallbackProgression, Node};
 use iceoryx2::prelude::{NodeState, ServiceName, ipc};
@@ -30,15 +29,6 @@ const NEWEST_DEPTH: usize = 64;
 const PLAN_DEPTH: usize = 2;
 /// Samples a subscriber may hold at once.
 const BORROWED: usize = 2;
-
-/// What a sweep of dead nodes did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SweepReport {
-    /// Dead nodes that were removed.
-    pub removed: u64,
-    /// Dead nodes that could not be removed.
-    pub left: u64,
-}
 
 /// The services of an instance. Dropping it ends them.
 pub struct Services {
@@ -74,13 +64,6 @@ impl Services {
     #[must_use]
     pub fn session(&self) -> &Session {
         &self.session
-    }
-
-    /// Removes what dead processes left in the middleware. Takes milliseconds: never call it from a timed thread.
-    #[must_use]
-    pub fn sweep(&self) -> SweepReport {
-        let state = self.session.node().blocking_cleanup_dead_nodes(Duration::from_millis(100));
-        SweepReport { removed: state.cleanups, left: state.failed_cleanups }
     }
 
     /// How many nodes of this instance are alive, and how many dead.

@@ -1,5 +1,7 @@
 //! A process's part in an instance: it opens what the supervisor created.
 
+use core::time::Duration;
+
 use iceoryx2::prelude::{
     Config, FilePath, Node, NodeBuilder, NodeName, SemanticString, SignalHandlingMode, ipc,
 };
@@ -54,6 +56,15 @@ impl SessionError {
     }
 }
 
+/// What a sweep of dead nodes did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SweepReport {
+    /// Dead nodes that were removed.
+    pub removed: u64,
+    /// Dead nodes that could not be removed.
+    pub left: u64,
+}
+
 /// A node of the middleware, and the ports made from it. It belongs to one thread.
 pub struct Session {
     node: Node<ipc::Service>,
@@ -101,6 +112,14 @@ impl Session {
     #[must_use]
     pub fn instance(&self) -> &Instance {
         &self.instance
+    }
+
+    /// Removes what dead processes left in the middleware. Only the supervisor does this, and on a thread that nothing
+    /// waits for: it takes milliseconds.
+    #[must_use]
+    pub fn sweep(&self) -> SweepReport {
+        let state = self.node.blocking_cleanup_dead_nodes(Duration::from_millis(100));
+        SweepReport { removed: state.cleanups, left: state.failed_cleanups }
     }
 
     pub(crate) fn node(&self) -> &Node<ipc::Service> {

@@ -4,10 +4,13 @@
 //! rear axle, on the ground. Lengths are metres, angles radians.
 
 pub mod angle;
+mod footprint;
 pub mod math;
+mod polygon;
 mod pose;
 mod vehicle;
 
+pub use polygon::{Bounds, ConvexPolygon, PolygonError, convex_distance};
 pub use pose::Pose;
 pub use vehicle::{
     Actuators, Drive, Encoders, Footprint, Gyro, Limits, Reference, SteeringSensor, Vehicle,

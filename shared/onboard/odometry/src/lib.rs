@@ -1,5 +1,30 @@
 //! From wheel counts to a pose: ingest, clock mapping, odometry models, the EKF.
+//!
+//! Two stages, each a pure function of its samples. [`Ingest`] turns readings into travel: counters
+//! unwrapped, the vehicle's clock mapped to the host's, every wheel marked valid or not, a gap left
+//! a gap. [`Estimator`] turns travel into a pose with covariance, by the
+//! [`OdometryModel`](kerbside_messages::OdometryModel) that the vehicle's [`Sensors`] allow.
+//!
+//! Neither allocates, reads a clock or logs in `step`.
+//!
+//! # Who survives whom
+//! While the vehicle's boot id stands, a counter is an absolute position: travel is the counter's
+//! own value times metres per count, and the counter epoch is the boot id. A restarted ingest
+//! therefore goes on with the very numbers its earlier life would have sent, up to a multiple of
+//! the counter's range, which the estimator takes out of every difference. So the pose outlives
+//! ingest, interface, estimator and any two of them; it is lost with the vehicle's restart, with a
+//! gap that a counter cannot tell, and, where the vehicle reports speeds instead of counts, with
+//! any of ingest's own restarts, since nothing says how far the wheels turned meanwhile.
 
+mod clock;
+mod estimator;
+mod ingest;
+mod sensors;
 mod settings;
+mod wheels;
 
+pub use clock::{ClockMap, Mapped};
+pub use estimator::{Estimator, EstimatorInputs};
+pub use ingest::Ingest;
+pub use sensors::{NoModel, Sensors, WheelSignal, model_for};
 pub use settings::{EstimatorSettings, IngestSettings, InitialPose};

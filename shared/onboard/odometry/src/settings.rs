@@ -5,9 +5,11 @@ use kerbside_geometry::Pose;
 /// Of the ingest stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IngestSettings {
-    /// A wheel may turn this many times faster than `limits.speed` allows before a reading is implausible.
+    /// A wheel may turn this many times faster than `limits.speed` allows before a reading is
+    /// implausible.
     pub speed_margin: f64,
-    /// Longest time without a reading that a counter may bridge \[s\]; beyond it a new counter epoch begins.
+    /// Longest time without a reading that a counter may bridge \[s\]; beyond it a new counter
+    /// epoch begins.
     pub longest_gap: f64,
     /// Time over which the vehicle's clock is compared with the host's \[s\].
     pub clock_window: f64,
@@ -24,13 +26,15 @@ impl Default for IngestSettings {
 /// Of the estimator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimatorSettings {
-    /// Random part of a wheel's travel, standard deviation \[m/sqrt(m)\], where the vehicle's file states none.
+    /// Random part of a wheel's travel, standard deviation \[m/sqrt(m)\], where the vehicle's file
+    /// states none.
     pub wheel_noise: f64,
     /// Standard deviation of the steering angle \[rad\], where the vehicle's file states none.
     pub steering_noise: f64,
     /// Standard deviation of the gyro \[rad/s\], where the vehicle's file states none.
     pub gyro_noise: f64,
-    /// Squared Mahalanobis length beyond which a correction is refused (chi-square, 3 degrees of freedom).
+    /// Squared Mahalanobis length beyond which a correction is refused (chi-square, 3 degrees of
+    /// freedom).
     pub gate: f64,
     /// Without a count for so long the vehicle stands \[s\].
     pub standstill_time: f64,

@@ -86,7 +86,8 @@ pub struct SafetySettings {
     pub cycle: Duration,
     /// The gate's own cycle, kept without commands.
     pub actuation_period: Duration,
-    /// Distance within which the vehicle must be able to stop from full speed after any single fault \[m\].
+    /// Distance within which the vehicle must be able to stop from full speed after any single
+    /// fault \[m\].
     pub stop_distance: f64,
 }
 

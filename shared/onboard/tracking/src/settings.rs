@@ -5,8 +5,9 @@
 pub struct TrackerSettings {
     /// Gain of the error along the path \[1/s\].
     pub gain_along: f64,
-    /// Spatial gain of the errors across the path and of heading \[1/m\]: both decay like exp(-gain * distance).
-    /// For a vehicle of wheelbase L the shipped 1:6 value 2.5 scales as 1.25 / L.
+    /// Spatial gain of the errors across the path and of heading \[1/m\]: both decay like
+    /// exp(-gain * distance). For a vehicle of wheelbase L the shipped 1:6 value 2.5 scales as
+    /// 1.25 / L.
     pub gain_across: f64,
     /// Greatest distance from the plan before the tracker stops \[m\].
     pub corridor: f64,

@@ -1,0 +1,46 @@
+//! What both actuators share: a command waits, is cut to the limit, and is approached through a
+//! lag.
+
+use crate::delay::Delay;
+use crate::lag::Lag;
+
+/// Delay, limit, lag.
+#[derive(Clone, Debug)]
+pub(crate) struct Actuator {
+    commands: Delay,
+    limit: f64,
+    lag: Lag,
+}
+
+impl Actuator {
+    /// At rest at zero: `delay` \[s\], `limit` of the value, `lag` \[s\], `rate_limit` \[1/s\].
+    pub(crate) fn new(delay: f64, limit: f64, lag: f64, rate_limit: f64) -> Self {
+        Self { commands: Delay::new(delay), limit, lag: Lag::new(lag, rate_limit) }
+    }
+
+    /// Takes in a command stamped `stamp` \[s\].
+    pub(crate) fn command(&mut self, stamp: f64, value: f64) {
+        self.commands.push(stamp, value);
+    }
+
+    /// Lets the commands act that are due at `now` \[s\]. Returns whether the value jumped.
+    pub(crate) fn begin(&mut self, now: f64) -> bool {
+        let due = self.commands.take(now);
+        due.is_some_and(|value| self.lag.aim(value.clamp(-self.limit, self.limit)))
+    }
+
+    /// When the next command begins to act \[s\].
+    pub(crate) fn next(&self) -> f64 {
+        self.commands.next()
+    }
+
+    /// The lag behind the limit.
+    pub(crate) fn lag(&self) -> &Lag {
+        &self.lag
+    }
+
+    /// Moves on to a value that the lag foretold.
+    pub(crate) fn move_to(&mut self, value: f64) {
+        self.lag.move_to(value);
+    }
+}

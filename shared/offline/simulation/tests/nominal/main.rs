@@ -1,0 +1,9 @@
+//! The nominal vehicle: its motion, its sensors, and its agreement with an independent reading.
+// Helpers of tests are tests.
+#![allow(clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
+mod bits;
+mod motion;
+mod sensing;
+mod support;
+mod vectors;

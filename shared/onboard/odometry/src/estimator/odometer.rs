@@ -1,0 +1,142 @@
+//! How far each wheel has rolled, and how much of that is in the pose.
+
+use kerbside_messages::{Travel, WheelStatus};
+
+use crate::wheels::WheelScale;
+
+/// What a travel brought.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Brought {
+    /// At least one wheel was read.
+    pub(crate) wheels: bool,
+    /// At least one wheel turned.
+    pub(crate) motion: bool,
+    /// A wheel's number comes from another life of ingest than the one before.
+    pub(crate) bridged: bool,
+    /// A wheel that the pose needs was looked for, and not all of them were usable.
+    pub(crate) lacking: bool,
+}
+
+/// Each wheel's travel of the counter epoch: the newest, and the one the pose stands for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Odometer {
+    scales: [WheelScale; 4],
+    needed: [bool; 4],
+    newest: [f64; 4],
+    applied: [f64; 4],
+    /// A newest travel of this epoch is known.
+    known: [bool; 4],
+    /// A zero of this epoch is known.
+    based: [bool; 4],
+    /// Read since the pose took it up.
+    fresh: [bool; 4],
+}
+
+impl Odometer {
+    /// Of a model that computes the pose from the wheels `needed`.
+    pub(crate) fn new(scales: [WheelScale; 4], needed: [bool; 4]) -> Self {
+        let no = [false; 4];
+        let zero = [0.0; 4];
+        Self { scales, needed, newest: zero, applied: zero, known: no, based: no, fresh: no }
+    }
+
+    /// Another counter epoch: no travel of the old one means anything.
+    pub(crate) fn forget(&mut self) {
+        *self = Self::new(self.scales, self.needed);
+    }
+
+    /// The pose stands for `applied` travels of the present epoch, whatever was taken up so far.
+    pub(crate) fn restore(&mut self, applied: [f64; 4]) {
+        self.applied = applied;
+        self.based = [true; 4];
+        self.fresh = self.known;
+    }
+
+    /// Takes what `travel` says of the wheels. Differences of cumulative travel alone are used, so
+    /// that a lost sample loses no motion.
+    pub(crate) fn read(&mut self, travel: &Travel) -> Brought {
+        let mut brought = Brought::default();
+        let mut unusable = false;
+        for index in 0..4 {
+            let status = travel.wheel(index);
+            if matches!(status, WheelStatus::Valid | WheelStatus::Zeroed) {
+                brought.wheels = true;
+                brought.bridged |= status == WheelStatus::Zeroed && self.based[index];
+                brought.motion |= self.take(index, travel.travel[index]);
+            } else if self.needed[index] {
+                unusable = true;
+                brought.lacking |= status == WheelStatus::Implausible;
+            }
+        }
+        let seen = (0..4).any(|index| self.needed[index] && self.fresh[index]);
+        brought.lacking |= unusable && brought.wheels && seen;
+        brought
+    }
+
+    fn take(&mut self, index: usize, travel: f64) -> bool {
+        let before = std::mem::replace(&mut self.newest[index], travel);
+        let turned = self.known[index] && travel != before;
+        self.known[index] = true;
+        self.fresh[index] = true;
+        if !self.based[index] {
+            self.applied[index] = travel;
+            self.based[index] = true;
+        }
+        turned
+    }
+
+    /// Whether every needed wheel was read since the pose took it up.
+    pub(crate) fn ready(&self) -> bool {
+        (0..4).all(|index| !self.needed[index] || self.fresh[index])
+    }
+
+    /// Travel of a wheel that is not yet in the pose \[m\].
+    pub(crate) fn unapplied(&self, index: usize) -> f64 {
+        self.scales[index].difference(self.newest[index], self.applied[index])
+    }
+
+    /// The largest of them among the wheels read, for the time in which another wheel is awaited
+    /// \[m\].
+    pub(crate) fn awaiting(&self) -> f64 {
+        let pending = |index: usize| self.needed[index] && self.fresh[index];
+        let largest = |most: f64, index: usize| most.max(self.unapplied(index).abs());
+        (0..4).filter(|index| pending(*index)).fold(0.0, largest)
+    }
+
+    /// Whether a wheel has turned farther than any can within `elapsed` seconds, `slack` seconds
+    /// and a factor allowed for, or may have turned so far that absolute counts no longer tell.
+    pub(crate) fn beyond_belief(&self, elapsed: f64, slack: f64, margin: f64) -> bool {
+        (0..4).filter(|index| self.needed[*index]).any(|index| {
+            let scale = &self.scales[index];
+            let reach = margin * scale.top_speed * (elapsed + slack);
+            self.unapplied(index).abs() > reach + 2.0 * scale.metres_per_count
+                || scale.top_speed * elapsed > 0.5 * scale.ring()
+        })
+    }
+
+    /// The pose has taken up all that was read.
+    pub(crate) fn apply(&mut self) {
+        self.applied = self.newest;
+        self.fresh = [false; 4];
+    }
+
+    /// The newest travels \[m\].
+    pub(crate) fn newest(&self, index: usize) -> f64 {
+        self.newest[index]
+    }
+
+    /// Travel from `before` to the newest \[m\].
+    pub(crate) fn since(&self, index: usize, before: f64) -> f64 {
+        self.scales[index].difference(self.newest[index], before)
+    }
+
+    /// The travels that the pose stands for: those it took up, and the newest of wheels it does not
+    /// use.
+    pub(crate) fn applied(&self) -> [f64; 4] {
+        let mut all = self.newest;
+        for index in (0..4).filter(|index| self.needed[*index]) {
+            all[index] = self.applied[index];
+        }
+        all
+    }
+}
