@@ -21,12 +21,17 @@ impl Sources {
     /// # Errors
     /// [`SettingsError`]: not there, not readable, or refused with every problem.
     pub fn stack(&self) -> Result<Loaded<Stack>, SettingsError> {
+        self.stack_for(None)
+    }
+
+    /// The stack as [`Sources::stack`] finds it, with `vehicle` (a name or path) in place of its own where one is given.
+    ///
+    /// # Errors
+    /// [`SettingsError`]: not there, not readable, or refused with every problem.
+    pub fn stack_for(&self, vehicle: Option<&str>) -> Result<Loaded<Stack>, SettingsError> {
         let given = self.given_stack();
-        stack::load(
-            self,
-            &given.unwrap_or_else(|| self.find(FileKind::Stack, "stack", None))?,
-            None,
-        )
+        let file = given.unwrap_or_else(|| self.find(FileKind::Stack, "stack", None))?;
+        stack::load(self, &file, vehicle)
     }
 
     /// The stack of a name or path, even if another file was given.

@@ -17,7 +17,7 @@ pub mod schema;
 pub mod text;
 pub mod topics;
 
-pub use admission::{Admission, Refusal, Refusals};
+pub use admission::{Admission, Admitted, Refusal, Refusals};
 pub use header::{Header, LAYOUT_VERSION, Message, check_sum, seal};
 pub use payloads::*;
 pub use topics::{Delivery, Process, Publisher, Topic};

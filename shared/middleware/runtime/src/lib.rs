@@ -38,7 +38,7 @@ pub use request::{Asked, Client, Pending, Server};
 pub use services::Services;
 pub use session::{Session, SessionError, SweepReport};
 pub use subscriber::{Newest, PlanSubscriber, Received, Standing, Subscriber};
-pub use wait::{Listener, Notifier, poll_readable};
+pub use wait::{Listener, Notifier, Readiness, poll_readable};
 
 /// Lets the log of iceoryx2 pass only warnings and errors: below that it prints whole structures.
 pub fn quieten_middleware_log() {

@@ -1,13 +1,16 @@
 //! Waking and waiting. A notification is a hint: whoever wakes drains its subscribers, and every wait is bounded.
 
 use core::time::Duration;
-use std::os::fd::{AsFd, AsRawFd, BorrowedFd, RawFd};
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 
 use iceoryx2::port::listener::Listener as ListenerPort;
 use iceoryx2::port::notifier::Notifier as NotifierPort;
 use iceoryx2::prelude::{FileDescriptorBased, ipc};
 use kerbside_messages::Nanos;
 use rustix::event::{PollFd, PollFlags, poll};
+use tokio::io::Interest;
+use tokio::io::unix::AsyncFd;
 
 use crate::clock::{now, timespec};
 
@@ -67,15 +70,33 @@ impl AsFd for Listener {
     }
 }
 
-impl AsRawFd for Listener {
-    fn as_raw_fd(&self) -> RawFd {
-        self.as_fd().as_raw_fd()
-    }
-}
-
 impl core::fmt::Debug for Listener {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(f, "Listener({})", self.topic)
+    }
+}
+
+/// A listener's descriptor in a tokio reactor: for the slow edges, never for a control step. A wake-up may get lost, so
+/// whoever waits here wakes by a timer too.
+#[derive(Debug)]
+pub struct Readiness(AsyncFd<OwnedFd>);
+
+impl Readiness {
+    /// Registers `listener` with the reactor of the current runtime.
+    ///
+    /// # Errors
+    /// Where the descriptor cannot be copied or registered.
+    pub fn of(listener: &Listener) -> io::Result<Self> {
+        let descriptor = listener.as_fd().try_clone_to_owned()?;
+        // SAFETY: the descriptor is owned by the registration, which gives out no way to close or replace it.
+        Ok(Self(unsafe { AsyncFd::register_with_interest(descriptor, Interest::READABLE)? }))
+    }
+
+    /// Waits for a notification. Drain the listener afterwards: readiness is cleared before, as the reactor wants it.
+    pub async fn wait(&self) {
+        if let Ok(mut guard) = self.0.readable().await {
+            guard.clear_ready();
+        }
     }
 }
 

@@ -30,13 +30,15 @@ pub struct Sensors {
 pub enum NoModel {
     /// No wheel reports.
     #[error(
-        "no wheel reports: nothing tells how far the vehicle rolls; counts_per_revolution of at least one wheel, \
+        "no wheel reports: nothing tells how far the vehicle rolls; counts_per_revolution of at \
+         least one wheel, \
          or a recording with wheel speeds, would do"
     )]
     NoWheel,
     /// One wheel, or one a side, and nothing else.
     #[error(
-        "only wheel {wheel} and neither steering sensor nor gyro: nothing tells how the vehicle turns; \
+        "only wheel {wheel} and neither steering sensor nor gyro: nothing tells how the vehicle \
+         turns; \
          a second wheel on the rear axle, a steering sensor or a gyro would do"
     )]
     NoTurning {
@@ -51,7 +53,8 @@ pub enum NoModel {
     NoDirection,
     /// A rear wheel that may stand still while the vehicle turns about it.
     #[error(
-        "only rear wheel {wheel}, beside the centre line, and a steering limit of {steering} rad: full lock turns \
+        "only rear wheel {wheel}, beside the centre line, and a steering limit of {steering} rad: \
+         full lock turns \
          the vehicle about that wheel, which then tells nothing; a second wheel would do"
     )]
     TurnsAboutWheel {

@@ -44,7 +44,10 @@ fn any_sensors() -> impl Strategy<Value = Sensors> {
 
 proptest! {
     #[test]
-    fn rubbish_in_samples_out(sensors in any_sensors(), raws in prop::collection::vec(any_raw(), 1..60)) {
+    fn rubbish_in_samples_out(
+        sensors in any_sensors(),
+        raws in prop::collection::vec(any_raw(), 1..60),
+    ) {
         let mut chain = Chain::with(&car(), &sensors, &placed());
         for raw in &raws {
             chain.feed(raw);

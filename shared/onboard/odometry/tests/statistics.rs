@@ -56,7 +56,7 @@ fn front_wheels_of_equal_noise_halve_the_square_error() {
             (drive(all, 1.0, top, rate, trials), drive(rear, 1.0, top, rate, trials));
         let ratio = fused.square / alone.square;
         println!(
-            "{top} m/s {rate} Hz: rms {:.4} against {:.4} m, ratio {ratio:.3}, bias {:.4}, gated {} of {}",
+            "{top} m/s {rate} Hz: rms {:.4} of {:.4} m, ratio {ratio:.3}, bias {:.4}, {} of {}",
             fused.square.sqrt(),
             alone.square.sqrt(),
             fused.bias,

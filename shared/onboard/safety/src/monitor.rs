@@ -54,6 +54,13 @@ impl LoopMonitor {
         self.step = Some(Step { begun: now, arrival, next: 0 });
     }
 
+    /// A newer input, which arrived at `arrival`, joins the step under way: a backlog is one step.
+    pub fn arrived(&mut self, arrival: Nanos) {
+        if let Some(step) = &mut self.step {
+            step.arrival = step.arrival.max(arrival);
+        }
+    }
+
     /// The step passes a checkpoint.
     pub fn checkpoint(&mut self, index: u32) {
         let expected = self.step.map(|step| step.next);
@@ -86,6 +93,13 @@ impl LoopMonitor {
     pub fn set_ready(&mut self, ready: bool, waiting_for: &str) {
         self.totals.ready = u8::from(ready);
         self.totals.text = text::from_str(if ready { "" } else { waiting_for });
+    }
+
+    /// What a ready process has to say beside being ready.
+    pub fn set_text(&mut self, text: &str) {
+        if self.totals.failed == 0 && self.totals.ready == 1 {
+            self.totals.text = text::from_str(text);
+        }
     }
 
     /// Whether the process has real-time rights.

@@ -82,6 +82,7 @@ fn stack(
         InterfaceKind::Replay => InterfaceSettings::Replay,
     };
     Stack {
+        vehicle_text: vehicle.show(),
         vehicle: vehicle.value.vehicle,
         vehicle_file: vehicle.file,
         uncertainty: vehicle.value.uncertainty,

@@ -28,6 +28,8 @@ pub struct Stack {
     pub vehicle: Vehicle,
     /// The file the vehicle comes from, as messages name it.
     pub vehicle_file: String,
+    /// The vehicle's effective file, for recordings.
+    pub vehicle_text: String,
     /// How far a car in good order may differ from the nominal one.
     pub uncertainty: Uncertainty,
     /// Supervision and gate, with and without real-time rights: see [`Stack::safety`].

@@ -122,14 +122,18 @@ mod tests {
             ];
             for row in 0..3 {
                 for (index, expected) in numeric.iter().enumerate() {
-                    let found = if index < 3 { by_pose[(row, index)] } else { by_piece[(row, index - 3)] };
-                    prop_assert!((found - expected[row]).abs() < 1e-8, "{row} {index}: {found} {expected:?}");
+                    let found =
+                        if index < 3 { by_pose[(row, index)] } else { by_piece[(row, index - 3)] };
+                    let error = (found - expected[row]).abs();
+                    prop_assert!(error < 1e-8, "{row} {index}: {found} {expected:?}");
                 }
             }
         }
 
         #[test]
-        fn the_motion_is_the_arc(yaw in -4.0..4.0_f64, distance in -1.0..1.0_f64, turn in -1.5..1.5_f64) {
+        fn the_motion_is_the_arc(
+            yaw in -4.0..4.0_f64, distance in -1.0..1.0_f64, turn in -1.5..1.5_f64
+        ) {
             let pose = Pose::new(0.3, -0.7, yaw);
             let (end, ..) = advance(&pose, &piece(distance, turn));
             let arc = pose.advance(distance, turn);

@@ -229,7 +229,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn wraps_do_not_show(bits in 6_u32..=64, start in any::<i64>(), steps in prop::collection::vec(-12_i64..=12, 1..300)) {
+        fn wraps_do_not_show(
+            bits in 6_u32..=64,
+            start in any::<i64>(),
+            steps in prop::collection::vec(-12_i64..=12, 1..300),
+        ) {
             let (mut wrapping, mut straight) = (counter(bits), counter(bits));
             let (mut count, mut sum, mut time) = (start, 0, 0.0);
             wrapping.read(sign_extended(count, bits), time, &BOUNDS);

@@ -14,8 +14,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
-/// The 1:6 car of the paper with the wheels and tracks of its Tables 1 and 2, and the digest's 2000
-/// counts.
+/// The 1:6 car of the paper with the wheels and tracks of its Tables 1 and 2, and 2000 counts
+/// a turn.
 pub(crate) fn car() -> Vehicle {
     Vehicle {
         name: "paper-1-6".to_owned(),

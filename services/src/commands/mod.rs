@@ -1,0 +1,176 @@
+//! The command line: a file per verb.
+
+mod config;
+mod operator;
+mod recording;
+mod status;
+mod up;
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+use kerbside_messages::Process;
+
+use crate::exit::{Exit, Failure};
+use crate::park::ParkArgs;
+use crate::service::{Service, ServiceArgs};
+use crate::vehicle::VehicleArgs;
+use crate::{
+    actuation, estimator, ingest, interface, logging, park, planner, recorder, tracker, vehicle,
+};
+
+/// Name of the instance of `up`, and of services started by hand.
+pub const DEFAULT_INSTANCE: &str = "kerbside";
+
+/// Parks a car-like vehicle from its own wheel encoders, as real-time processes on shared memory.
+#[derive(Debug, Parser)]
+#[command(
+    name = "kerbside",
+    version,
+    max_term_width = 100,
+    after_help = "Example: kerbside park garage"
+)]
+pub struct Cli {
+    /// Level of the log on standard error: error, warn, info, debug or trace; RUST_LOG goes before it.
+    #[arg(long, global = true, value_name = "LEVEL")]
+    log: Option<String>,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Park the simulated vehicle in a scenario and judge the result.
+    #[command(after_help = "Example: kerbside park parallel --seed 3 --out /tmp/parallel")]
+    Park(ParkArgs),
+    /// Run the stack until Ctrl-C.
+    #[command(after_help = "Example: kerbside up --config config/stack.toml --simulate")]
+    Up(up::UpArgs),
+    /// Arm: permit motion for the next plan.
+    #[command(after_help = "Example: kerbside arm")]
+    Arm(operator::OperatorArgs),
+    /// Stop the vehicle; the stack stays up.
+    #[command(after_help = "Example: kerbside stop")]
+    Stop(operator::OperatorArgs),
+    /// Stop the vehicle and end the stack.
+    #[command(after_help = "Example: kerbside down --instance bay2")]
+    Down(operator::OperatorArgs),
+    /// Tell the estimator where the standing vehicle is.
+    #[command(after_help = "Example: kerbside fix -- -1.0 0.65 0")]
+    Fix(operator::FixArgs),
+    /// Arm, and drive to the goal of a scenario.
+    #[command(after_help = "Example: kerbside go garage")]
+    Go(operator::GoArgs),
+    /// Show each process and the mode, live from shared memory.
+    #[command(after_help = "Example: kerbside status --json")]
+    Status(status::StatusArgs),
+    /// Check, show or explain the configuration.
+    #[command(subcommand)]
+    Config(config::ConfigVerb),
+    /// Check or recover a recording.
+    #[command(subcommand)]
+    Recording(recording::RecordingVerb),
+    /// Run one process of a stack; the supervisor starts them by itself.
+    #[command(subcommand, after_help = "Example: kerbside service tracker --instance bay2")]
+    Service(ServiceVerb),
+}
+
+#[derive(Debug, Subcommand)]
+enum ServiceVerb {
+    /// The line to the vehicle.
+    Interface(ServiceArgs),
+    /// Counts to travel.
+    Ingest(ServiceArgs),
+    /// Travel to pose.
+    Estimator(ServiceArgs),
+    /// Requests to plans.
+    Planner(ServiceArgs),
+    /// Pose and plan to command.
+    Tracker(ServiceArgs),
+    /// The gate before the vehicle.
+    Actuation(ServiceArgs),
+    /// Samples to disk.
+    Recorder(ServiceArgs),
+    /// The simulated vehicle, outside the supervised set.
+    Vehicle(VehicleArgs),
+}
+
+/// Runs what the command line says.
+///
+/// # Errors
+/// [`Failure`] with its exit code.
+pub fn run(cli: &Cli) -> Result<Exit, Failure> {
+    let level = cli.log.as_deref();
+    match &cli.verb {
+        Verb::Park(args) => {
+            logging::start("park", level.unwrap_or("warn"), false);
+            park::run(args)
+        }
+        Verb::Up(args) => up::run(args, level),
+        Verb::Service(verb) => serve(verb, level),
+        Verb::Arm(_)
+        | Verb::Stop(_)
+        | Verb::Down(_)
+        | Verb::Fix(_)
+        | Verb::Go(_)
+        | Verb::Status(_) => {
+            logging::start("operator", level.unwrap_or("warn"), false);
+            operate(&cli.verb)
+        }
+        Verb::Config(verb) => {
+            logging::start("config", level.unwrap_or("warn"), false);
+            config::run(verb)
+        }
+        Verb::Recording(verb) => {
+            logging::start("recording", level.unwrap_or("warn"), false);
+            recording::run(verb)
+        }
+    }
+}
+
+fn operate(verb: &Verb) -> Result<Exit, Failure> {
+    use kerbside_messages::Verb as Ask;
+    match verb {
+        Verb::Arm(args) => operator::ask(args, Ask::Arm),
+        Verb::Stop(args) => operator::ask(args, Ask::Stop),
+        Verb::Down(args) => operator::ask(args, Ask::Down),
+        Verb::Fix(args) => operator::fix(args),
+        Verb::Go(args) => operator::go(args),
+        Verb::Status(args) => status::run(args),
+        _ => Err(Failure::internal("not an operator's verb")),
+    }
+}
+
+fn serve(verb: &ServiceVerb, level: Option<&str>) -> Result<Exit, Failure> {
+    let (process, args, body): (_, _, fn(&Service) -> Result<Exit, Failure>) = match verb {
+        ServiceVerb::Interface(args) => (Process::Interface, args, interface::run),
+        ServiceVerb::Ingest(args) => (Process::Ingest, args, ingest::run),
+        ServiceVerb::Estimator(args) => (Process::Estimator, args, estimator::run),
+        ServiceVerb::Planner(args) => (Process::Planner, args, planner::run),
+        ServiceVerb::Tracker(args) => (Process::Tracker, args, tracker::run),
+        ServiceVerb::Actuation(args) => (Process::Actuation, args, actuation::run),
+        ServiceVerb::Recorder(args) => (Process::Recorder, args, recorder::run),
+        ServiceVerb::Vehicle(args) => {
+            let service = Service::load(Process::Vehicle, &args.service, DEFAULT_INSTANCE)?;
+            start_log(&service, level);
+            return vehicle::run(args, service);
+        }
+    };
+    let service = Service::load(process, args, DEFAULT_INSTANCE)?;
+    start_log(&service, level);
+    body(&service)
+}
+
+fn start_log(service: &Service, level: Option<&str>) {
+    let log = &service.stack.log;
+    let json = log.format == kerbside_settings::LogFormat::Json;
+    logging::start(service.process.name(), level.unwrap_or(log.level.name()), json);
+}
+
+/// Where results go, for verbs that write files.
+#[derive(Clone, Debug, clap::Args)]
+pub struct OutArgs {
+    /// Folder for the results; a new one in the state folder where not given.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}

@@ -1,0 +1,147 @@
+//! `status`: each process and the mode.
+
+use core::time::Duration;
+
+use comfy_table::Table;
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use kerbside_messages::{Mode, Process, ProcessRow, ProcessState, State, text};
+use kerbside_runtime::{Instance, Newest, Session, Ticker, now};
+use serde_json::json;
+
+use crate::exit::{Exit, Failure};
+use crate::manoeuvre::cause_of;
+
+/// Longest wait for a state: the supervisor publishes it every few milliseconds.
+const PATIENCE: u64 = 1_000_000_000;
+
+/// What `status` is asked.
+#[derive(Clone, Debug, clap::Args)]
+pub struct StatusArgs {
+    /// Name of the instance; the only live one where not given.
+    #[arg(long, value_name = "NAME")]
+    instance: Option<String>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The instance that is meant: the named one, or the only live one.
+///
+/// # Errors
+/// [`Failure`] where none or several are meant.
+pub fn instance_of(name: Option<&str>) -> Result<Instance, Failure> {
+    let live = Instance::live();
+    if let Some(name) = name {
+        let instance = Instance::named(name)?;
+        if instance.supervisor().is_none() {
+            let known: Vec<_> = live.iter().map(|(instance, _)| instance.name()).collect();
+            let help = if known.is_empty() {
+                "none is".to_owned()
+            } else {
+                format!("these are: {}", known.join(", "))
+            };
+            return Err(Failure::with_help(
+                Exit::Unavailable,
+                format!("instance {name} is not running"),
+                help,
+            ));
+        }
+        return Ok(instance);
+    }
+    match &live[..] {
+        [] => Err(Failure::with_help(
+            Exit::Unavailable,
+            "no instance is running",
+            "kerbside up starts one",
+        )),
+        [(instance, _)] => Ok(instance.clone()),
+        several => {
+            let names: Vec<_> = several
+                .iter()
+                .map(|(instance, pid)| format!("{} (process {pid})", instance.name()))
+                .collect();
+            let help = format!("name one with --instance: {}", names.join(", "));
+            Err(Failure::with_help(Exit::Unavailable, "several instances are running", help))
+        }
+    }
+}
+
+/// Runs the verb: exit code 0 unless the stack is faulted or silent.
+///
+/// # Errors
+/// [`Failure`] where there is no instance.
+pub fn run(args: &StatusArgs) -> Result<Exit, Failure> {
+    let instance = instance_of(args.instance.as_deref())?;
+    let session = Session::join(&instance, Process::Operator)?;
+    let mut state = Newest::of(session.subscriber::<State>(None, 1)?);
+    let mut look = Ticker::new(Duration::from_millis(5));
+    let deadline = now() + PATIENCE;
+    while !state.update() {
+        if now() > deadline {
+            let words = format!("the supervisor of instance {} is silent", instance.name());
+            return Err(Failure::unavailable(words));
+        }
+        look.wait();
+    }
+    let Some(state) = state.get() else { return Err(Failure::internal("a state without content")) };
+    if args.json {
+        print_json(&instance, state)
+    } else {
+        print_table(&instance, state)
+    }
+    Ok(if state.mode() == Mode::Faulted { Exit::Bad } else { Exit::Good })
+}
+
+fn print_json(instance: &Instance, state: &State) {
+    let row = |row: &ProcessRow| {
+        json!({
+            "name": name_of(row), "pid": row.pid, "state": state_of(row), "restarts": row.restarts,
+            "misses": row.misses, "age_ms": row.age_ms, "waiting_for": text::as_str(&row.waiting_for),
+        })
+    };
+    let object = json!({
+        "schema": "kerbside.status.v1",
+        "version": env!("CARGO_PKG_VERSION"),
+        "seed": null,
+        "passed": state.mode() != Mode::Faulted,
+        "figures": [],
+        "instance": instance.name(),
+        "mode": state.mode().name(),
+        "cause": cause_of(state),
+        "processes": state.rows().iter().map(row).collect::<Vec<_>>(),
+    });
+    println!("{object}");
+}
+
+fn print_table(instance: &Instance, state: &State) {
+    println!(
+        "instance {}: {}, {}; supervisor is process {}",
+        instance.name(),
+        state.mode(),
+        cause_of(state),
+        state.pid
+    );
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    table.set_header(["process", "pid", "state", "restarts", "misses", "age ms", "says"]);
+    for row in state.rows() {
+        table.add_row([
+            name_of(row).to_owned(),
+            row.pid.to_string(),
+            state_of(row).to_owned(),
+            row.restarts.to_string(),
+            row.misses.to_string(),
+            row.age_ms.to_string(),
+            text::as_str(&row.waiting_for).to_owned(),
+        ]);
+    }
+    println!("{table}");
+}
+
+fn name_of(row: &ProcessRow) -> &'static str {
+    Process::from_id(row.process).map_or("unknown", Process::name)
+}
+
+fn state_of(row: &ProcessRow) -> &'static str {
+    ProcessState::from_code(row.state).map_or("unknown", ProcessState::name)
+}

@@ -1,0 +1,51 @@
+//! Ingest: counts to travel.
+//!
+//! Topics in: `raw`, every one in order. Topics out: `travel`, one per reading.
+
+use core::time::Duration;
+
+use kerbside_messages::{Raw, Travel};
+use kerbside_odometry::{Ingest, NoModel};
+
+use crate::exit::{Exit, Failure};
+use crate::life::{Life, Service};
+
+/// Longest wait; its timing decides nothing.
+pub const WAIT: Duration = Duration::from_millis(20);
+
+/// Runs ingest.
+///
+/// # Errors
+/// [`Failure`] where the process cannot take part, or the vehicle has nothing to compute motion from.
+pub fn run(service: &Service) -> Result<Exit, Failure> {
+    let mut stage = Ingest::with_sensors(&service.vehicle, &service.sensors, &service.stack.ingest)
+        .map_err(no_model)?;
+    let mut life = Life::join(service, 1)?;
+    let mut raw = life.subscriber::<Raw>(512)?;
+    let mut travel = life.publisher::<Travel>()?;
+    let listener = life.listener::<Raw>()?;
+    life.waits_for(None);
+    while life.goes_on() {
+        listener.wait(WAIT);
+        while let Some(sample) = raw.receive() {
+            life.begin(sample.arrival);
+            let sent = travel.send(|out| {
+                stage.step(&sample, sample.missing, sample.new_epoch, out);
+                true
+            });
+            if let Err(error) = sent {
+                tracing::error!(%error, "travel lost");
+            }
+        }
+        life.checkpoint(0);
+        life.end();
+        life.counts(raw.refusals());
+    }
+    Ok(life.exit())
+}
+
+/// A vehicle that has nothing to compute motion from.
+#[must_use]
+pub fn no_model(error: NoModel) -> Failure {
+    Failure::new(Exit::Data, error)
+}

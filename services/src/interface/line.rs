@@ -1,0 +1,248 @@
+//! The serial line: readings in, commands out.
+//!
+//! Topics in: `actuator`. Topics out: `raw`. Without commands the interface sends nothing of its own: silence is
+//! what stops the vehicle. The line is opened by name, and again after an error or 100 ms of silence.
+
+use std::os::fd::AsFd;
+use std::path::PathBuf;
+
+use kerbside_line::{Frame, HostEnd, HostEvent, Reading};
+use kerbside_messages::{Actuator, Header, Nanos, Raw};
+use kerbside_runtime::{Newest, Publisher, now, poll_readable};
+use kerbside_settings::InterfaceSettings;
+
+use super::serial::Line;
+use crate::exit::{Exit, Failure};
+use crate::life::{Life, Service, nanos};
+
+/// Time between attempts to open the line, and longest wait for input \[ns\].
+const REOPEN: Nanos = 100_000_000;
+const WAIT: Nanos = 5_000_000;
+
+/// The stage between line and samples: pure, driven live and in lockstep.
+#[derive(Clone, Debug, Default)]
+pub struct LineStage {
+    end: HostEnd,
+    sent: Option<(u64, u64)>,
+    heard: Option<Nanos>,
+}
+
+impl LineStage {
+    /// Takes bytes that arrived at `now`; calls `reading` for each reading, `news` for everything else.
+    pub fn receive(
+        &mut self,
+        now: Nanos,
+        bytes: &[u8],
+        mut reading: impl FnMut(&Reading, u32),
+        mut news: impl FnMut(HostEvent),
+    ) {
+        let heard = &mut self.heard;
+        self.end.receive(bytes, &mut |event| match event {
+            HostEvent::Reading { reading: content, line_errors } => {
+                *heard = Some(now);
+                reading(&content, line_errors);
+            }
+            other => news(other),
+        });
+    }
+
+    /// The frame for the newest actuator sample, once per sample, while it is fresh.
+    pub fn command(&mut self, now: Nanos, actuator: &Actuator, freshness: Nanos) -> Option<Frame> {
+        let id = (actuator.header.epoch, actuator.header.sequence);
+        if self.sent == Some(id) || now.saturating_sub(actuator.header.sent) > freshness {
+            return None;
+        }
+        #[allow(clippy::cast_possible_truncation)] // the line carries single precision
+        let frame = self.end.command(actuator.speed as f32, actuator.steering as f32)?;
+        self.sent = Some(id);
+        Some(frame)
+    }
+
+    /// A frame of the handshake that is due.
+    pub fn pending(&mut self) -> Option<Frame> {
+        self.end.pending()
+    }
+
+    /// The line is gone.
+    pub fn line_lost(&mut self) {
+        self.end.line_lost();
+        self.heard = None;
+    }
+
+    /// Whether readings come and commands count.
+    #[must_use]
+    pub fn is_up(&self, now: Nanos, silence: Nanos) -> bool {
+        self.end.is_open() && self.heard.is_some_and(|heard| now.saturating_sub(heard) <= silence)
+    }
+
+    /// When the last reading came.
+    #[must_use]
+    pub fn heard(&self) -> Option<Nanos> {
+        self.heard
+    }
+}
+
+/// A reading as a sample: what the vehicle said, nothing added.
+pub fn reading_to_raw(reading: &Reading, line_errors: u32, arrival: Nanos, out: &mut Raw) {
+    let sensors = &reading.sensors;
+    out.header = Header::stamped(arrival, arrival);
+    out.vehicle_time = sensors.time;
+    out.arrival = arrival;
+    out.counts = sensors.counts;
+    out.counts_mask = sensors.counts_mask;
+    out.speeds = sensors.speeds.map(f64::from);
+    out.speeds_mask = sensors.speeds_mask;
+    out.steering = f64::from(sensors.steering.unwrap_or(0.0));
+    out.has_steering = u8::from(sensors.steering.is_some());
+    out.yaw_rate = f64::from(sensors.yaw_rate.unwrap_or(0.0));
+    out.has_yaw_rate = u8::from(sensors.yaw_rate.is_some());
+    out.boot = reading.boot;
+    out.frame = reading.sequence;
+    out.line_errors = line_errors;
+}
+
+/// The device: open, or waited for.
+struct Door {
+    path: PathBuf,
+    baud: u32,
+    line: Option<Line>,
+    opened: Nanos,
+    next: Nanos,
+    said: bool,
+}
+
+impl Door {
+    fn new(path: PathBuf, baud: u32) -> Self {
+        Self { path, baud, line: None, opened: 0, next: 0, said: false }
+    }
+
+    fn open(&mut self, now: Nanos) {
+        if self.line.is_some() || now < self.next {
+            return;
+        }
+        self.next = now + REOPEN;
+        match Line::open(&self.path, self.baud) {
+            Ok(line) => {
+                tracing::info!(line = %self.path.display(), "line opened");
+                (self.line, self.opened, self.said) = (Some(line), now, false);
+            }
+            Err(error) if !self.said => {
+                tracing::warn!(line = %self.path.display(), %error, "line cannot be opened, trying on");
+                self.said = true;
+            }
+            Err(_) => {}
+        }
+    }
+
+    fn close(&mut self, stage: &mut LineStage, why: &str) {
+        if self.line.take().is_some() {
+            tracing::warn!(line = %self.path.display(), why, "line lost");
+            stage.line_lost();
+        }
+    }
+
+    fn read<'a>(&mut self, stage: &mut LineStage, buffer: &'a mut [u8]) -> Option<&'a [u8]> {
+        match self.line.as_mut()?.read(buffer) {
+            Ok(length) => Some(&buffer[..length]),
+            Err(error) => {
+                self.close(stage, &error.to_string());
+                None
+            }
+        }
+    }
+
+    fn send(&mut self, stage: &mut LineStage, actuator: Option<&Actuator>, freshness: Nanos) {
+        let Some(line) = &mut self.line else { return };
+        let handshake = stage.pending();
+        let command = actuator.and_then(|actuator| stage.command(now(), actuator, freshness));
+        let write = |frame: Frame| line.write(&frame);
+        if let Err(error) = [handshake, command].into_iter().flatten().try_for_each(write) {
+            self.close(stage, &error.to_string());
+        }
+    }
+
+    fn close_when_silent(&mut self, stage: &mut LineStage, silence: Nanos) {
+        let newest = stage.heard().unwrap_or(0).max(self.opened);
+        if now().saturating_sub(newest) > silence {
+            self.close(stage, "silent");
+        }
+    }
+}
+
+/// Runs the interface.
+///
+/// # Errors
+/// [`Failure`] where the process cannot take part.
+pub fn run(service: &Service) -> Result<Exit, Failure> {
+    let mut life = Life::join(service, 2)?;
+    let silence = nanos(life.timeouts().line_silence);
+    let freshness = nanos(life.timeouts().freshness);
+    let mut raw = life.publisher::<Raw>()?;
+    let mut actuator = Newest::of(life.subscriber::<Actuator>(1)?);
+    let listener = life.listener::<Actuator>()?;
+    let (device, baud) = device_of(service);
+    let mut door = Door::new(device, baud);
+    let mut stage = LineStage::default();
+    let mut buffer = [0; 4096];
+    while life.goes_on() {
+        door.open(now());
+        wait(&door, &listener);
+        listener.drain();
+        let arrival = now();
+        life.begin(arrival);
+        if let Some(bytes) = door.read(&mut stage, &mut buffer) {
+            hear(&mut stage, arrival, bytes, &mut raw);
+        }
+        life.checkpoint(0);
+        actuator.update();
+        door.send(&mut stage, actuator.get(), freshness);
+        life.checkpoint(1);
+        life.end();
+        door.close_when_silent(&mut stage, silence);
+        life.waits_for(if stage.is_up(now(), silence) { None } else { Some("the vehicle's line") });
+    }
+    Ok(life.exit())
+}
+
+fn hear(stage: &mut LineStage, arrival: Nanos, bytes: &[u8], raw: &mut Publisher<Raw>) {
+    let publish = |reading: &Reading, line_errors: u32| {
+        let sent = raw.send(|out| {
+            reading_to_raw(reading, line_errors, arrival, out);
+            true
+        });
+        if let Err(error) = sent {
+            tracing::error!(%error, "reading lost");
+        }
+    };
+    stage.receive(arrival, bytes, publish, log_news);
+}
+
+/// The configured device; without one, the instance's simulated vehicle.
+fn device_of(service: &Service) -> (PathBuf, u32) {
+    match &service.stack.interface {
+        InterfaceSettings::Line { device: Some(device), baud } => (device.clone(), *baud),
+        InterfaceSettings::Line { device: None, baud } => (service.instance.vehicle_link(), *baud),
+        InterfaceSettings::Replay => (service.instance.vehicle_link(), 0),
+    }
+}
+
+fn wait(door: &Door, listener: &kerbside_runtime::Listener) {
+    let deadline = now() + WAIT;
+    match &door.line {
+        Some(line) => poll_readable(&[line.as_fd(), listener.as_fd()], deadline),
+        None => poll_readable(&[listener.as_fd()], deadline),
+    };
+}
+
+fn log_news(event: HostEvent) {
+    match event {
+        HostEvent::Hello(hello) => tracing::info!(?hello, "vehicle described itself"),
+        HostEvent::Started { boot } => tracing::info!(boot, "commands count from now on"),
+        HostEvent::Restarted { boot } => {
+            tracing::warn!(boot, "vehicle started anew: its counters are new")
+        }
+        HostEvent::Closed => tracing::warn!("vehicle forgot this host; shaking hands again"),
+        HostEvent::Refused(refusal) => tracing::error!(%refusal, "no session with this vehicle"),
+        HostEvent::Reading { .. } => {}
+    }
+}

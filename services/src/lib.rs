@@ -1,0 +1,27 @@
+//! kerbside: parks a car-like vehicle from its own wheel encoders, as real-time processes on shared memory.
+
+pub mod actuation;
+pub mod commands;
+pub mod configuration;
+pub mod estimator;
+pub mod exit;
+pub mod figures;
+pub mod ingest;
+pub mod interface;
+pub mod life;
+pub mod lockstep;
+pub mod logging;
+pub mod machine;
+pub mod manoeuvre;
+pub mod output;
+pub mod parent;
+pub mod park;
+pub mod planner;
+pub mod realtime;
+pub mod recorder;
+pub mod service;
+pub mod supervisor;
+pub mod tracker;
+pub mod vehicle;
+
+pub use commands::{Cli, run};

@@ -1,0 +1,377 @@
+//! The operator's part of a parking manoeuvre: fix, arm, plan, watch; and after a fault, where asked to, once more.
+//!
+//! Pure: the live run and lockstep drive the same decisions, each with its own time.
+
+use core::time::Duration;
+
+use kerbside_messages::{
+    Cause, EstimatorState, Mode, Nanos, Odometry, OperatorAnswer, PlanAnswer, PlanVerdict, Process,
+    State, text,
+};
+
+/// Nothing the operator waits for may take longer than this.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// A request that nobody answers is sent again after so long.
+const ANSWER: Duration = Duration::from_secs(1);
+/// State that is older than this means that the supervisor is gone.
+const STATE_AGE: Duration = Duration::from_secs(1);
+/// The vehicle stands so long before the manoeuvre is judged.
+const SETTLE: Duration = Duration::from_millis(500);
+/// Longest drive beyond the plan's own duration.
+const OVERTIME: Duration = Duration::from_secs(20);
+
+/// What the operator sees at one instant.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Observation<'a> {
+    /// The newest state.
+    pub state: Option<&'a State>,
+    /// The newest odometry.
+    pub odometry: Option<&'a Odometry>,
+    /// An answer to `arm` that came since the last look.
+    pub armed: Option<&'a OperatorAnswer>,
+    /// An answer to a plan request that came since the last look.
+    pub planned: Option<&'a PlanAnswer>,
+    /// The simulated vehicle ended.
+    pub vehicle_lost: bool,
+    /// The supervisor's process ended.
+    pub supervisor_lost: bool,
+    /// The person asked to stop.
+    pub interrupted: bool,
+}
+
+/// What the operator does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Act {
+    /// Nothing for now.
+    Watch,
+    /// Publish the fix of the start.
+    Fix,
+    /// Ask for an arm.
+    Arm,
+    /// Ask for a plan under this count of arms.
+    Plan {
+        /// The count.
+        arm: u64,
+    },
+    /// The manoeuvre is over.
+    End(End),
+}
+
+/// How a manoeuvre ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The plan was completed and the vehicle stands.
+    Completed,
+    /// The stack stopped.
+    Stopped(Cause),
+    /// No plan was found.
+    NoPlan(PlanVerdict),
+    /// The pose is gone, and arming needs one.
+    PoseLost,
+    /// The supervisor is gone.
+    SupervisorLost,
+    /// The simulated vehicle is gone.
+    VehicleLost,
+    /// Something took longer than it may.
+    TimedOut(&'static str),
+    /// The person asked to stop.
+    Interrupted,
+}
+
+impl core::fmt::Display for End {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Completed => f.write_str("plan completed"),
+            Self::Stopped(cause) => f.write_str(cause.name()),
+            Self::NoPlan(verdict) => f.write_str(verdict.name()),
+            Self::PoseLost => f.write_str("pose lost"),
+            Self::SupervisorLost => f.write_str("supervisor lost"),
+            Self::VehicleLost => f.write_str("vehicle lost"),
+            Self::TimedOut(what) => write!(f, "timed out: {what}"),
+            Self::Interrupted => f.write_str("interrupted"),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The stack comes up, or recovers from a fault.
+    Waiting,
+    /// A fix was published.
+    Fixing { resets: u32 },
+    /// An arm was asked for.
+    Arming,
+    /// A plan was asked for under this arm.
+    Planning { arm: u64, planner_restarts: u32 },
+    /// A plan stands; the vehicle drives it.
+    Driving { arm: u64 },
+    /// The plan is completed; the vehicle settles.
+    Settling,
+}
+
+/// The operator of one manoeuvre.
+#[derive(Clone, Debug)]
+pub struct Manoeuvre {
+    phase: Phase,
+    since: Nanos,
+    asked: Option<Nanos>,
+    fixed: bool,
+    rearm: bool,
+    drive_limit: Nanos,
+    heard: Option<(u64, Nanos)>,
+}
+
+impl Manoeuvre {
+    /// A manoeuvre that begins at `now`; after a fault it is armed again where `rearm`.
+    #[must_use]
+    pub fn new(now: Nanos, rearm: bool) -> Self {
+        Self {
+            phase: Phase::Waiting,
+            since: now,
+            asked: None,
+            fixed: false,
+            rearm,
+            drive_limit: 0,
+            heard: None,
+        }
+    }
+
+    /// What is going on, in words.
+    #[must_use]
+    pub fn phase(&self) -> &'static str {
+        match self.phase {
+            Phase::Waiting => "waiting for the stack",
+            Phase::Fixing { .. } => "setting the pose",
+            Phase::Arming => "arming",
+            Phase::Planning { .. } => "planning",
+            Phase::Driving { .. } => "driving",
+            Phase::Settling => "settling",
+        }
+    }
+
+    /// Looks at what is there at `now` and decides.
+    pub fn step(&mut self, now: Nanos, seen: &Observation<'_>) -> Act {
+        if let Some(end) = self.lost(now, seen) {
+            return Act::End(end);
+        }
+        let Some(state) = seen.state else { return self.overdue(now, "the stack does not start") };
+        match self.phase {
+            Phase::Waiting => self.waiting(now, state, seen),
+            Phase::Fixing { resets } => self.fixing(now, resets, seen),
+            Phase::Arming => self.arming(now, state, seen),
+            Phase::Planning { arm, planner_restarts } => {
+                self.planning(now, state, arm, planner_restarts, seen)
+            }
+            Phase::Driving { arm } => self.driving(now, state, arm),
+            Phase::Settling => self.settling(now, seen),
+        }
+    }
+
+    /// Losses that end the manoeuvre whatever it is at.
+    fn lost(&mut self, now: Nanos, seen: &Observation<'_>) -> Option<End> {
+        if seen.interrupted {
+            return Some(End::Interrupted);
+        }
+        if seen.vehicle_lost {
+            return Some(End::VehicleLost);
+        }
+        if seen.supervisor_lost || self.state_is_old(now, seen.state) {
+            return Some(End::SupervisorLost);
+        }
+        None
+    }
+
+    /// Judged by when a new state was last seen, so that a slow start is no loss.
+    fn state_is_old(&mut self, now: Nanos, state: Option<&State>) -> bool {
+        let Some(state) = state else { return false };
+        match self.heard {
+            Some((sequence, at)) if sequence == state.header.sequence => {
+                now.saturating_sub(at) > span(STATE_AGE)
+            }
+            _ => {
+                self.heard = Some((state.header.sequence, now));
+                false
+            }
+        }
+    }
+
+    fn waiting(&mut self, now: Nanos, state: &State, seen: &Observation<'_>) -> Act {
+        let Some(odometry) = seen.odometry else { return self.overdue(now, "no odometry comes") };
+        match state.mode() {
+            Mode::Ready | Mode::Faulted if state.healthy == 1 || !self.fixed => {
+                if !self.fixed {
+                    if state.mode() != Mode::Ready || odometry.standstill == 0 {
+                        return self.overdue(now, "the stack does not become ready");
+                    }
+                    self.enter(now, Phase::Fixing { resets: odometry.resets });
+                    self.asked = Some(now);
+                    return Act::Fix;
+                }
+                if odometry.state != EstimatorState::Valid.code() {
+                    return Act::End(End::PoseLost);
+                }
+                if odometry.standstill == 0 {
+                    return self.overdue(now, "the vehicle does not come to rest");
+                }
+                self.enter(now, Phase::Arming);
+                self.asked = Some(now);
+                Act::Arm
+            }
+            Mode::Faulted if state.cause == Cause::GaveUp.code() => {
+                Act::End(End::Stopped(Cause::GaveUp))
+            }
+            _ => self.overdue(now, "the stack does not become ready"),
+        }
+    }
+
+    fn fixing(&mut self, now: Nanos, resets: u32, seen: &Observation<'_>) -> Act {
+        let taken = |odometry: &Odometry| {
+            odometry.resets != resets && odometry.state == EstimatorState::Valid.code()
+        };
+        if seen.odometry.is_some_and(taken) {
+            self.fixed = true;
+            self.enter(now, Phase::Arming);
+            self.asked = Some(now);
+            return Act::Arm;
+        }
+        if self.answer_is_late(now) {
+            self.asked = Some(now);
+            return Act::Fix;
+        }
+        self.overdue(now, "the fix is not taken")
+    }
+
+    fn arming(&mut self, now: Nanos, state: &State, seen: &Observation<'_>) -> Act {
+        if let Some(answer) = seen.armed
+            && answer.accepted == 1
+        {
+            let planner_restarts = restarts_of(state, Process::Planner);
+            self.enter(now, Phase::Planning { arm: answer.arms, planner_restarts });
+            self.asked = Some(now);
+            return Act::Plan { arm: answer.arms };
+        }
+        if self.answer_is_late(now) {
+            let lost = |odometry: &Odometry| odometry.state != EstimatorState::Valid.code();
+            if seen.odometry.is_some_and(lost) {
+                return Act::End(End::PoseLost);
+            }
+            self.asked = Some(now);
+            return Act::Arm;
+        }
+        self.overdue(now, "the stack refuses to arm")
+    }
+
+    fn planning(
+        &mut self,
+        now: Nanos,
+        state: &State,
+        arm: u64,
+        planner_restarts: u32,
+        seen: &Observation<'_>,
+    ) -> Act {
+        if let Some(act) = self.halted(now, state, arm) {
+            return act;
+        }
+        if let Some(answer) = seen.planned {
+            let verdict = PlanVerdict::from_code(answer.verdict).unwrap_or(PlanVerdict::Malformed);
+            match verdict {
+                PlanVerdict::Found => {
+                    self.drive_limit = kerbside_messages::nanos(answer.duration) + span(OVERTIME);
+                    self.enter(now, Phase::Driving { arm });
+                    return Act::Watch;
+                }
+                // The vehicle may still roll out, or a predecessor's request be under way: ask again.
+                PlanVerdict::Moving | PlanVerdict::Busy | PlanVerdict::NoPose => {}
+                other => return Act::End(End::NoPlan(other)),
+            }
+        }
+        let restarts = restarts_of(state, Process::Planner);
+        let restarted = restarts != planner_restarts && row_is_healthy(state, Process::Planner);
+        if restarted || (seen.planned.is_some() && self.answer_is_late(now)) {
+            self.phase = Phase::Planning { arm, planner_restarts: restarts };
+            self.asked = Some(now);
+            return Act::Plan { arm };
+        }
+        self.overdue(now, "no plan comes")
+    }
+
+    fn driving(&mut self, now: Nanos, state: &State, arm: u64) -> Act {
+        let completed = state.cause == Cause::Completed.code()
+            && matches!(state.mode(), Mode::Done | Mode::Ready);
+        if completed && state.arms == arm {
+            self.enter(now, Phase::Settling);
+            return Act::Watch;
+        }
+        if let Some(act) = self.halted(now, state, arm) {
+            return act;
+        }
+        if now.saturating_sub(self.since) > self.drive_limit {
+            return Act::End(End::TimedOut("the manoeuvre takes longer than its plan"));
+        }
+        Act::Watch
+    }
+
+    fn settling(&mut self, now: Nanos, seen: &Observation<'_>) -> Act {
+        let stands = seen.odometry.is_some_and(|odometry| odometry.standstill == 1);
+        if stands && now.saturating_sub(self.since) >= span(SETTLE) {
+            return Act::End(End::Completed);
+        }
+        self.overdue(now, "the vehicle does not come to rest")
+    }
+
+    /// The stack stopped by itself: try again where asked to, else end with the cause.
+    fn halted(&mut self, now: Nanos, state: &State, arm: u64) -> Option<Act> {
+        let cause = Cause::from_code(state.cause).unwrap_or(Cause::None);
+        // The state may be older than our arm: judge only what came after it.
+        if state.arms != arm || !matches!(state.mode(), Mode::Faulted | Mode::Ready) {
+            return None;
+        }
+        if cause == Cause::PoseLost {
+            return Some(Act::End(End::PoseLost));
+        }
+        if !self.rearm || matches!(cause, Cause::GaveUp | Cause::Operator) {
+            return Some(Act::End(End::Stopped(cause)));
+        }
+        self.enter(now, Phase::Waiting);
+        Some(Act::Watch)
+    }
+
+    fn answer_is_late(&self, now: Nanos) -> bool {
+        self.asked.is_none_or(|asked| now.saturating_sub(asked) > span(ANSWER))
+    }
+
+    fn overdue(&self, now: Nanos, what: &'static str) -> Act {
+        if now.saturating_sub(self.since) > span(PATIENCE) {
+            Act::End(End::TimedOut(what))
+        } else {
+            Act::Watch
+        }
+    }
+
+    fn enter(&mut self, now: Nanos, phase: Phase) {
+        self.phase = phase;
+        self.since = now;
+        self.asked = None;
+    }
+}
+
+fn span(duration: Duration) -> Nanos {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
+
+fn restarts_of(state: &State, process: Process) -> u32 {
+    state.rows().iter().find(|row| row.process == process as u8).map_or(0, |row| row.restarts)
+}
+
+fn row_is_healthy(state: &State, process: Process) -> bool {
+    let healthy = kerbside_messages::ProcessState::Healthy.code();
+    state.rows().iter().any(|row| row.process == process as u8 && row.state == healthy)
+}
+
+/// The cause of the state in words, with the process it names.
+#[must_use]
+pub fn cause_of(state: &State) -> String {
+    let words = text::as_str(&state.text);
+    let cause = Cause::from_code(state.cause).map_or("unknown", Cause::name);
+    if words.is_empty() { cause.to_owned() } else { format!("{cause}: {words}") }
+}

@@ -1,0 +1,49 @@
+//! Where files go, and what their names are.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use crate::exit::{Exit, Failure};
+
+/// The user's folder for results: the XDG state folder.
+#[must_use]
+pub fn state_folder() -> PathBuf {
+    let from =
+        |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    from("XDG_STATE_HOME")
+        .or_else(|| from("HOME").map(|home| home.join(".local/state")))
+        .unwrap_or_else(std::env::temp_dir)
+        .join("kerbside")
+}
+
+/// The folder for the results of one run: `out`, or a new one in the state folder.
+///
+/// # Errors
+/// [`Failure`] where it cannot be made.
+pub fn folder(out: Option<&Path>, verb: &str) -> Result<PathBuf, Failure> {
+    let folder =
+        out.map_or_else(|| state_folder().join(format!("{verb}-{}", stamp())), Path::to_path_buf);
+    fs::create_dir_all(&folder).map_err(|error| cannot_write(&folder, &error))?;
+    // Children run elsewhere and error messages are read elsewhere: name files in full.
+    fs::canonicalize(&folder).map_err(|error| cannot_write(&folder, &error))
+}
+
+/// Writes a file of results.
+///
+/// # Errors
+/// [`Failure`] naming the file.
+pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    fs::write(path, text).map_err(|error| cannot_write(path, &error))
+}
+
+fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::new(Exit::Unavailable, format!("{}: {error}", path.display()))
+}
+
+/// The present moment for names of files: seconds of the epoch and the pid, so that two runs never share one.
+#[must_use]
+pub fn stamp() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |passed| passed.as_secs());
+    format!("{seconds}-{}", std::process::id())
+}

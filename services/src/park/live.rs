@@ -1,0 +1,345 @@
+//! A run as processes: the supervisor and the simulated vehicle are started, watched, and ended in order.
+
+use core::time::Duration;
+use std::os::unix::process::CommandExt;
+use std::path::PathBuf;
+use std::process::{Child, Command as ProcessCommand, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use kerbside_messages::{
+    Actuator, Command, Fix, Heartbeat, Message, Odometry, OperatorAnswer, OperatorRequest,
+    PlanAnswer, PlanRequest, Process, State, Truth, Verb,
+};
+use kerbside_runtime::{
+    Client, Instance, Newest, Pending, PlanSubscriber, Publisher, Session, SessionError,
+    Subscriber, Ticker, now,
+};
+
+use super::progress::Progress;
+use super::scene::Start;
+use super::trace::Trace;
+use super::{Job, Run};
+use crate::exit::Failure;
+use crate::life::stop_flag;
+use crate::manoeuvre::{Act, End, Manoeuvre, Observation};
+use crate::vehicle::format_pose;
+
+/// The operator looks every so often.
+const LOOK: Duration = Duration::from_millis(20);
+/// Longest wait for the instance's services after the supervisor was started.
+const START: Duration = Duration::from_secs(10);
+/// Longest wait for the supervisor's orderly end.
+const END: Duration = Duration::from_secs(10);
+
+/// Runs `job` as processes.
+///
+/// # Errors
+/// [`Failure`] where the stack cannot be started.
+pub fn run(job: &Job, progress: &Progress) -> Result<Run, Failure> {
+    let begun = now();
+    let stop = stop_flag()?;
+    let start = Start::draw(&job.scenario, job.seed);
+    let mut stack = Children::start(job, &start)?;
+    let session = wait_for(&job.service.instance, &mut stack, &stop)?;
+    let mut desk = Desk::open(&session, job)?;
+    let mut trace = Trace::new(now());
+    let end = operate(job, &start, &mut stack, &mut desk, &mut trace, progress, &stop);
+    drop((desk, session));
+    stack.end();
+    Ok(Run {
+        trace,
+        end,
+        recording: job.recording.clone(),
+        instance: Some(job.service.instance.name().to_owned()),
+        wall_seconds: kerbside_messages::seconds(now() - begun),
+        search_seconds: 0.0,
+        simulated_seconds: 0.0,
+    })
+}
+
+fn operate(
+    job: &Job,
+    start: &Start,
+    stack: &mut Children,
+    desk: &mut Desk,
+    trace: &mut Trace,
+    progress: &Progress,
+    stop: &AtomicBool,
+) -> End {
+    let mut manoeuvre = Manoeuvre::new(now(), job.rearm);
+    let mut look = Ticker::new(LOOK);
+    loop {
+        desk.take_in(trace);
+        let armed = desk.armed.as_mut().and_then(Pending::poll);
+        let planned = desk.planned.as_mut().and_then(Pending::poll);
+        if planned.is_some() {
+            // The plan was sent before its answer.
+            desk.take_plan(trace);
+        }
+        let seen = Observation {
+            state: desk.state.get(),
+            odometry: desk.newest_odometry.as_ref(),
+            armed: armed.as_ref(),
+            planned: planned.as_ref(),
+            vehicle_lost: stack.vehicle_ended(),
+            supervisor_lost: stack.supervisor_ended(),
+            interrupted: stop.load(Ordering::Relaxed),
+        };
+        let act = manoeuvre.step(now(), &seen);
+        if let Act::End(end) = act {
+            return end;
+        }
+        if let Err(error) = desk.act(act, job, start) {
+            tracing::warn!(%error, "operator's message lost; it will be sent again");
+        }
+        progress.show(manoeuvre.phase(), trace);
+        look.wait();
+    }
+}
+
+/// The supervisor and the simulated vehicle.
+struct Children {
+    supervisor: Child,
+    vehicle: Child,
+    instance: Instance,
+}
+
+impl Children {
+    fn start(job: &Job, start: &Start) -> Result<Self, Failure> {
+        job.service.instance.create_folder()?;
+        let arguments = job.service.arguments();
+        let parent = std::process::id().to_string();
+        let mut vehicle = own_executable();
+        vehicle.args(["service", "vehicle"]).args(&arguments);
+        vehicle.args(["--start", &format_pose(&start.truth), "--seed", &job.seed.to_string()]);
+        let mut supervisor = own_executable();
+        supervisor.arg("up").args(&arguments);
+        let vehicle = spawn(vehicle.args(["--with-parent", &parent]))?;
+        let supervisor = match spawn(supervisor.args(["--with-parent", &parent])) {
+            Ok(supervisor) => supervisor,
+            Err(failure) => {
+                kerbside_runtime::kill(vehicle.id());
+                return Err(failure);
+            }
+        };
+        Ok(Self { supervisor, vehicle, instance: job.service.instance.clone() })
+    }
+
+    fn vehicle_ended(&mut self) -> bool {
+        matches!(self.vehicle.try_wait(), Ok(Some(_)) | Err(_))
+    }
+
+    fn supervisor_ended(&mut self) -> bool {
+        matches!(self.supervisor.try_wait(), Ok(Some(_)) | Err(_))
+    }
+
+    /// Ends both: in order where the supervisor still listens, by force where it does not.
+    fn end(&mut self) {
+        kerbside_runtime::terminate(self.supervisor.id());
+        wait_or_kill(&mut self.supervisor);
+        end_orphans(&self.instance);
+        kerbside_runtime::terminate(self.vehicle.id());
+        wait_or_kill(&mut self.vehicle);
+        if let Err(error) = self.instance.remove() {
+            tracing::warn!(%error, "something of the instance is left");
+        }
+    }
+}
+
+impl Drop for Children {
+    fn drop(&mut self) {
+        if !(self.supervisor_ended() && self.vehicle_ended()) {
+            self.end();
+        }
+    }
+}
+
+/// Processes whose supervisor was killed end by themselves after two seconds; nobody waits for that here.
+fn end_orphans(instance: &Instance) {
+    for process in Process::SUPERVISED {
+        if let Some(pid) = kerbside_runtime::FileLock::holder(&instance.process_lock(process)) {
+            kerbside_runtime::kill(pid);
+        }
+    }
+}
+
+fn own_executable() -> ProcessCommand {
+    let mut command = ProcessCommand::new("/proc/self/exe");
+    command.arg0("kerbside");
+    command
+}
+
+fn spawn(command: &mut ProcessCommand) -> Result<Child, Failure> {
+    kerbside_runtime::close_inherited_on_exec();
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .process_group(0)
+        .spawn()
+        .map_err(Failure::internal)
+}
+
+fn wait_or_kill(child: &mut Child) {
+    let deadline = now() + crate::life::nanos(END);
+    let mut look = Ticker::new(LOOK);
+    while matches!(child.try_wait(), Ok(None)) {
+        if now() > deadline {
+            tracing::warn!(pid = child.id(), "does not end; killed");
+            kerbside_runtime::kill(child.id());
+        }
+        look.wait();
+    }
+}
+
+fn wait_for(
+    instance: &Instance,
+    stack: &mut Children,
+    stop: &Arc<AtomicBool>,
+) -> Result<Session, Failure> {
+    let deadline = now() + crate::life::nanos(START);
+    let mut look = Ticker::new(Duration::from_millis(5));
+    loop {
+        // The configuration is there before the services are: the last one that is created decides.
+        let joined = Session::join(instance, Process::Operator).and_then(|session| {
+            session.client::<OperatorRequest, OperatorAnswer>().map(|_| session)
+        });
+        match joined {
+            Ok(session) => return Ok(session),
+            Err(error) if !error.is_missing() => return Err(error.into()),
+            Err(error) if now() > deadline => return Err(Failure::unavailable(error)),
+            Err(_) => {}
+        }
+        if stack.supervisor_ended() {
+            return Err(Failure::unavailable(
+                "the supervisor ended at its start; its messages are above",
+            ));
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Err(Failure::unavailable("interrupted"));
+        }
+        look.wait();
+    }
+}
+
+/// The operator's ports.
+struct Desk {
+    odometry: Subscriber<Odometry>,
+    newest_odometry: Option<Odometry>,
+    truth: Subscriber<Truth>,
+    command: Subscriber<Command>,
+    actuator: Subscriber<Actuator>,
+    heartbeats: Vec<Subscriber<Heartbeat>>,
+    state: Newest<State>,
+    plan: PlanSubscriber,
+    fix: Publisher<Fix>,
+    operator: Client<OperatorRequest, OperatorAnswer>,
+    planner: Client<PlanRequest, PlanAnswer>,
+    armed: Option<Pending<OperatorRequest, OperatorAnswer>>,
+    planned: Option<Pending<PlanRequest, PlanAnswer>>,
+    requests: u64,
+}
+
+impl Desk {
+    fn open(session: &Session, job: &Job) -> Result<Self, SessionError> {
+        let beats = |process| session.subscriber::<Heartbeat>(Some(process), 16);
+        Ok(Self {
+            odometry: session.subscriber(None, 512)?,
+            newest_odometry: None,
+            truth: session.subscriber(None, 64)?,
+            command: session.subscriber(None, 64)?,
+            actuator: session.subscriber(None, 64)?,
+            heartbeats: job
+                .service
+                .supervised()
+                .into_iter()
+                .map(beats)
+                .collect::<Result<_, _>>()?,
+            state: Newest::of(session.subscriber(None, 1)?),
+            plan: session.plan_subscriber()?,
+            fix: session.publisher(None)?,
+            operator: session.client()?,
+            planner: session.client()?,
+            armed: None,
+            planned: None,
+            requests: 0,
+        })
+    }
+
+    fn take_in(&mut self, trace: &mut Trace) {
+        while let Some(odometry) = self.odometry.receive() {
+            trace.odometry.push(*odometry);
+            self.newest_odometry = Some(*odometry);
+        }
+        while let Some(truth) = self.truth.receive() {
+            trace.truth.push(*truth);
+        }
+        self.take_plan(trace);
+        while let Some(command) = self.command.receive() {
+            trace.command(&command);
+        }
+        while let Some(actuator) = self.actuator.receive() {
+            trace.actuators.push(*actuator);
+        }
+        for heartbeats in &mut self.heartbeats {
+            while let Some(beat) = heartbeats.receive() {
+                trace.heartbeat(&beat);
+            }
+        }
+        if self.state.update()
+            && let Some(state) = self.state.get()
+        {
+            trace.state(state);
+        }
+    }
+
+    fn take_plan(&mut self, trace: &mut Trace) {
+        if self.plan.update()
+            && let Some((head, points)) = self.plan.get()
+        {
+            super::take_plan(trace, head.header.sent, head, points);
+        }
+    }
+
+    fn act(
+        &mut self,
+        act: Act,
+        job: &Job,
+        start: &Start,
+    ) -> Result<(), kerbside_runtime::RuntimeError> {
+        match act {
+            Act::Watch | Act::End(_) => {}
+            Act::Fix => {
+                let content = start.fix(now());
+                self.fix.send(|fix| {
+                    *fix = content;
+                    true
+                })?;
+            }
+            Act::Arm => {
+                self.requests += 1;
+                let request = OperatorRequest {
+                    id: self.requests,
+                    pid: std::process::id(),
+                    verb: Verb::Arm.code(),
+                    ..OperatorRequest::default()
+                };
+                self.armed = Some(self.operator.send(request)?);
+            }
+            Act::Plan { arm } => {
+                self.requests += 1;
+                let mut request = job.scenario.plan_request(&job.service.vehicle);
+                (request.id, request.arm) = (self.requests, arm);
+                debug_assert!(request.header().version == 0, "sealed by the client");
+                self.planned = Some(self.planner.send(request)?);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where a run records.
+#[must_use]
+pub fn recording_in(folder: &std::path::Path) -> PathBuf {
+    folder.join("recording.mcap")
+}

@@ -1,0 +1,152 @@
+//! What a process is started with: its instance, its configuration, and how to hand both on to children.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use kerbside_geometry::Vehicle;
+use kerbside_messages::Process;
+use kerbside_odometry::Sensors;
+use kerbside_runtime::Instance;
+use kerbside_safety::SafetySettings;
+use kerbside_settings::{InterfaceSettings, Stack, Start};
+
+use crate::configuration;
+use crate::exit::{Exit, Failure};
+
+/// Where a process finds its instance and its configuration.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct ServiceArgs {
+    /// Name of the instance.
+    #[arg(long, value_name = "NAME")]
+    pub instance: Option<String>,
+    /// Configuration: a stack's file, or a folder like config/.
+    #[arg(long, value_name = "PATH")]
+    pub config: Option<PathBuf>,
+    /// Scenario whose stack and vehicle are used: a file, or the name of a shipped one.
+    #[arg(long, value_name = "NAME", hide = true)]
+    pub scenario: Option<String>,
+    /// Vehicle, in place of the one the configuration names: a file, or the name of a shipped one.
+    #[arg(long, value_name = "FILE")]
+    pub vehicle: Option<String>,
+    /// File to record to.
+    #[arg(long, value_name = "FILE")]
+    pub recording: Option<PathBuf>,
+    /// Feed this run folder or recording in place of a vehicle.
+    #[arg(long, value_name = "PATH", hide = true)]
+    pub input: Option<PathBuf>,
+    /// Speed of the replay against real time; as fast as it goes where not given.
+    #[arg(long, value_name = "FACTOR", hide = true)]
+    pub speed: Option<f64>,
+    /// An earlier life of this process ended: its pose comes from there, not from the configuration.
+    #[arg(long, hide = true)]
+    pub restarted: bool,
+    /// The instance runs with real-time rights, and so with the shorter time-outs.
+    #[arg(long, hide = true)]
+    pub realtime: bool,
+}
+
+/// A process's instance and configuration, loaded and checked.
+#[derive(Clone, Debug)]
+pub struct Service {
+    /// Which process this is.
+    pub process: Process,
+    /// The instance.
+    pub instance: Instance,
+    /// The configuration.
+    pub stack: Stack,
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// What the vehicle senses.
+    pub sensors: Sensors,
+    /// What it was started with.
+    pub args: ServiceArgs,
+}
+
+impl Service {
+    /// Loads what `args` name, for `process`; `default_instance` where they name none.
+    ///
+    /// # Errors
+    /// [`Failure`] where the configuration is refused or the name is none.
+    pub fn load(
+        process: Process,
+        args: &ServiceArgs,
+        default_instance: &str,
+    ) -> Result<Self, Failure> {
+        let instance = Instance::named(args.instance.as_deref().unwrap_or(default_instance))?;
+        let (config, vehicle) = (args.config.as_deref(), args.vehicle.as_deref());
+        let mut stack = match &args.scenario {
+            Some(scenario) => configuration::parking(config, scenario, vehicle)?.stack.value,
+            None => configuration::stack(config, vehicle)?,
+        };
+        let vehicle = stack.vehicle.clone();
+        let sensors = Sensors::of(&vehicle);
+        if args.restarted {
+            stack.estimator.initial_pose = None;
+        }
+        Ok(Self { process, instance, stack, vehicle, sensors, args: args.clone() })
+    }
+
+    /// Whether the instance runs with real-time rights.
+    #[must_use]
+    pub fn realtime(&self) -> bool {
+        self.args.realtime
+    }
+
+    /// Supervision and gate, as this instance's rights make them.
+    #[must_use]
+    pub fn safety(&self) -> &SafetySettings {
+        self.stack.safety(self.realtime())
+    }
+
+    /// Whether somebody else than the supervisor starts `process`.
+    #[must_use]
+    pub fn is_external(&self, process: Process) -> bool {
+        self.stack.start_of(process) == Start::External
+    }
+
+    /// The processes its supervisor answers for: a replay needs no plan and moves nothing.
+    #[must_use]
+    pub fn supervised(&self) -> Vec<Process> {
+        let replay = self.stack.interface == InterfaceSettings::Replay;
+        let takes_part = |process: &Process| match process {
+            Process::Interface | Process::Ingest | Process::Estimator => true,
+            Process::Recorder => self.stack.recorder.enabled,
+            _ => !replay,
+        };
+        Process::SUPERVISED.into_iter().filter(takes_part).collect()
+    }
+
+    /// The arguments that give a child the same instance and configuration.
+    #[must_use]
+    pub fn arguments(&self) -> Vec<OsString> {
+        let mut arguments: Vec<OsString> = vec!["--instance".into(), self.instance.name().into()];
+        let mut add = |flag: &str, value: Option<OsString>| {
+            if let Some(value) = value {
+                arguments.extend([flag.into(), value]);
+            }
+        };
+        add("--config", self.args.config.clone().map(Into::into));
+        add("--scenario", self.args.scenario.clone().map(Into::into));
+        add("--vehicle", self.args.vehicle.clone().map(Into::into));
+        add("--recording", self.args.recording.clone().map(Into::into));
+        add("--input", self.args.input.clone().map(Into::into));
+        add("--speed", self.args.speed.map(|speed| speed.to_string().into()));
+        if self.args.realtime {
+            arguments.push("--realtime".into());
+        }
+        arguments
+    }
+}
+
+/// Refuses a factor that is none.
+///
+/// # Errors
+/// [`Failure`] with the usage exit code.
+pub fn check_speed(speed: Option<f64>) -> Result<(), Failure> {
+    match speed {
+        Some(speed) if !(speed.is_finite() && speed > 0.0) => {
+            Err(Failure::new(Exit::Usage, format!("--speed {speed}: a factor above 0 is allowed")))
+        }
+        _ => Ok(()),
+    }
+}

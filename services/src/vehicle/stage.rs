@@ -1,0 +1,134 @@
+//! The simulated vehicle's stage: commands in, readings out, and its own stop on silence. Pure, driven live and in
+//! lockstep.
+
+use core::time::Duration;
+
+use kerbside_geometry::{Pose, Vehicle};
+use kerbside_line::{Frame, Hello, Sensors, VehicleEnd, VehicleEvent};
+use kerbside_messages::{Header, Nanos, Truth, nanos, seconds};
+use kerbside_simulation::{Noise, Simulator};
+
+/// What a simulated vehicle is made of.
+#[derive(Clone, Debug)]
+pub struct Making {
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// Where it stands at first.
+    pub start: Pose,
+    /// Seed of its sensors' noise.
+    pub seed: u64,
+    /// Its boot id.
+    pub boot: u32,
+    /// Silence after which it stops by itself.
+    pub silence: Duration,
+}
+
+/// The simulated vehicle. Times are its own \[ns since its start\].
+#[derive(Clone, Debug)]
+pub struct VehicleStage {
+    end: VehicleEnd,
+    simulator: Simulator,
+    period: Nanos,
+    time: Nanos,
+    silent: bool,
+}
+
+impl VehicleStage {
+    /// A vehicle that stands and waits for a host.
+    #[must_use]
+    pub fn new(making: &Making) -> Self {
+        let mut simulator =
+            Simulator::new(&making.vehicle, making.start, &Noise::default(), making.seed);
+        let period = period_of(&making.vehicle);
+        let hello = hello_of(making, &simulator.reading(), period);
+        Self { end: VehicleEnd::new(hello), simulator, period, time: 0, silent: true }
+    }
+
+    /// Time between readings \[ns\].
+    #[must_use]
+    pub fn period(&self) -> Nanos {
+        self.period
+    }
+
+    /// Takes bytes from the line at `time`.
+    pub fn receive(&mut self, time: Nanos, bytes: &[u8]) {
+        let simulator = &mut self.simulator;
+        self.end.receive(time, bytes, &mut |event| {
+            if let VehicleEvent::Command { speed, steering, .. } = event {
+                simulator.command(seconds(time), f64::from(speed), f64::from(steering));
+            }
+        });
+    }
+
+    /// Drives until `time` and writes what is due then: handshake and one reading.
+    pub fn tick(&mut self, time: Nanos, mut write: impl FnMut(&Frame)) {
+        self.simulator.advance(seconds(time));
+        self.time = time;
+        // The vehicle's own layer of safety: commands that stay away are a command to stop.
+        let silent = self.end.is_silent(time);
+        if silent && !self.silent {
+            self.simulator.command(seconds(time), 0.0, self.simulator.steering());
+        }
+        self.silent = silent;
+        while let Some(frame) = self.end.pending(time) {
+            write(&frame);
+        }
+        let reading = self.simulator.reading();
+        write(&self.end.reading(&sensors_of(time, &reading)));
+    }
+
+    /// The true state, at the host's time `now`.
+    pub fn truth(&self, now: Nanos, out: &mut Truth) {
+        let pose = self.simulator.pose();
+        *out = Truth {
+            header: Header::stamped(now, 0),
+            x: pose.x,
+            y: pose.y,
+            yaw: pose.yaw,
+            speed: self.simulator.speed(),
+            steering: self.simulator.steering(),
+            distance: self.simulator.distance(),
+            vehicle_time: self.time,
+            silent: u8::from(self.silent),
+            ..Truth::default()
+        };
+    }
+}
+
+/// Time between readings \[ns\]: that of the fastest sensor.
+fn period_of(vehicle: &Vehicle) -> Nanos {
+    let rates = [
+        vehicle.encoders.map(|sensor| sensor.rate),
+        vehicle.steering_sensor.map(|sensor| sensor.rate),
+        vehicle.gyro.map(|sensor| sensor.rate),
+    ];
+    let fastest = rates.into_iter().flatten().fold(1.0, f64::max);
+    nanos(1.0 / fastest)
+}
+
+fn hello_of(making: &Making, reading: &kerbside_simulation::SensorReading, period: Nanos) -> Hello {
+    let bits = making.vehicle.encoders.map_or(32, |encoders| encoders.counter_bits);
+    Hello {
+        boot: making.boot,
+        counter_bits: u8::try_from(bits).unwrap_or(64),
+        counts_mask: reading.counts_mask,
+        speeds_mask: reading.speeds_mask,
+        has_steering: reading.steering.is_some(),
+        has_yaw_rate: reading.yaw_rate.is_some(),
+        reading_period_us: u32::try_from(period / 1000).unwrap_or(u32::MAX),
+        silence_ms: u16::try_from(making.silence.as_millis()).unwrap_or(u16::MAX),
+    }
+}
+
+#[allow(clippy::cast_possible_truncation)] // the line carries single precision
+fn sensors_of(time: Nanos, reading: &kerbside_simulation::SensorReading) -> Sensors {
+    Sensors {
+        time,
+        counts_mask: reading.counts_mask,
+        counts: reading.counts,
+        speeds_mask: reading.speeds_mask,
+        speeds: reading.speeds.map(|speed| speed as f32),
+        steering: reading.steering.map(|angle| angle as f32),
+        yaw_rate: reading.yaw_rate.map(|rate| rate as f32),
+    }
+}
