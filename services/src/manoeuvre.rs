@@ -197,6 +197,9 @@ impl Manoeuvre {
 
     fn waiting(&mut self, now: Nanos, state: &State, seen: &Observation<'_>) -> Act {
         let Some(odometry) = seen.odometry else { return self.overdue(now, "no odometry comes") };
+        if state.cause == Cause::GaveUp.code() {
+            return Act::End(End::Stopped(Cause::GaveUp));
+        }
         match state.mode() {
             Mode::Ready | Mode::Faulted if state.healthy == 1 || !self.fixed => {
                 if !self.fixed {
@@ -216,9 +219,6 @@ impl Manoeuvre {
                 self.enter(now, Phase::Arming);
                 self.asked = Some(now);
                 Act::Arm
-            }
-            Mode::Faulted if state.cause == Cause::GaveUp.code() => {
-                Act::End(End::Stopped(Cause::GaveUp))
             }
             _ => self.overdue(now, "the stack does not become ready"),
         }

@@ -12,7 +12,7 @@ use kerbside_messages::{
     State, Travel, Truth,
 };
 use kerbside_recordings::recording::{Provenance, RecordingWriter, WriteError};
-use kerbside_runtime::{PlanSubscriber, Session, SessionError, Subscriber, Ticker, now};
+use kerbside_runtime::{PlanSubscriber, Session, SessionError, Subscriber, Ticker, depth, now};
 
 use crate::exit::{Exit, Failure};
 use crate::life::{self, Service, Worker};
@@ -48,21 +48,21 @@ enum Disk {
 impl Recorder {
     fn open(session: &Session, service: &Service) -> Result<Self, SessionError> {
         let mut feeds = vec![
-            feed::<Raw>(session, None, 512)?,
-            feed::<Travel>(session, None, 512)?,
-            feed::<Odometry>(session, None, 512)?,
-            feed::<Restore>(session, None, 16)?,
-            feed::<Fix>(session, None, 16)?,
+            feed::<Raw>(session, None)?,
+            feed::<Travel>(session, None)?,
+            feed::<Odometry>(session, None)?,
+            feed::<Restore>(session, None)?,
+            feed::<Fix>(session, None)?,
             plan_feed(session)?,
-            feed::<Command>(session, None, 256)?,
-            feed::<Permit>(session, None, 64)?,
-            feed::<Inhibit>(session, None, 8)?,
-            feed::<Actuator>(session, None, 256)?,
-            feed::<State>(session, None, 64)?,
-            feed::<Truth>(session, None, 64)?,
+            feed::<Command>(session, None)?,
+            feed::<Permit>(session, None)?,
+            feed::<Inhibit>(session, None)?,
+            feed::<Actuator>(session, None)?,
+            feed::<State>(session, None)?,
+            feed::<Truth>(session, None)?,
         ];
         for process in service.supervised() {
-            feeds.push(feed::<Heartbeat>(session, Some(process), 16)?);
+            feeds.push(feed::<Heartbeat>(session, Some(process))?);
         }
         Ok(Self { feeds, poll: Ticker::new(POLL), disk: Disk::create(service) })
     }
@@ -144,12 +144,8 @@ fn provenance(service: &Service) -> Provenance {
     }
 }
 
-fn feed<M: Message>(
-    session: &Session,
-    process: Option<Process>,
-    buffer: usize,
-) -> Result<Feed, SessionError> {
-    let mut subscriber: Subscriber<M> = session.subscriber(process, buffer)?;
+fn feed<M: Message>(session: &Session, process: Option<Process>) -> Result<Feed, SessionError> {
+    let mut subscriber: Subscriber<M> = session.subscriber(process, depth(M::TOPIC))?;
     Ok(Box::new(move |writer| {
         while let Some(sample) = subscriber.receive() {
             writer.write_message(&*sample, &[], now())?;

@@ -35,7 +35,7 @@ pub use process::{close_inherited_on_exec, kill, terminate};
 pub use publisher::{PlanPublisher, Publisher};
 pub use realtime::{RealtimeReport, RealtimeRequest, enter_realtime};
 pub use request::{Asked, Client, Pending, Server};
-pub use services::Services;
+pub use services::{Services, depth};
 pub use session::{Session, SessionError, SweepReport};
 pub use subscriber::{Newest, PlanSubscriber, Received, Standing, Subscriber};
 pub use wait::{Listener, Notifier, Readiness, poll_readable};

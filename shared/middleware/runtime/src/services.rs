@@ -23,8 +23,10 @@ const SPARE_SUBSCRIBERS: usize = 8;
 const ANY_PUBLISHERS: usize = 16;
 /// A process and its dead predecessor.
 const ONE_PUBLISHER: usize = 2;
-/// Samples kept of a topic of which the newest counts, for subscribers that want them all.
-const NEWEST_DEPTH: usize = 64;
+/// Time over which a topic of which the newest counts is kept, for subscribers that want every sample \[s\].
+const NEWEST_SPAN: f64 = 1.28;
+/// Samples that are kept of a topic that speaks seldom.
+const SELDOM_DEPTH: usize = 16;
 /// The same for plans, which are large.
 const PLAN_DEPTH: usize = 2;
 /// Samples a subscriber may hold at once.
@@ -119,10 +121,15 @@ fn create_all(node: &Node<ipc::Service>) -> Result<Vec<Box<dyn Any>>, SessionErr
     Ok(made)
 }
 
-fn depth(topic: &Topic) -> usize {
+/// Samples that a subscriber of `topic` can keep at most.
+#[must_use]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // rates are small and positive
+pub fn depth(topic: &Topic) -> usize {
     match topic.delivery {
         Delivery::InOrder { depth } => depth,
-        Delivery::Newest | Delivery::RequestResponse => NEWEST_DEPTH,
+        Delivery::Newest | Delivery::RequestResponse => {
+            ((topic.rate * NEWEST_SPAN) as usize).max(SELDOM_DEPTH)
+        }
     }
 }
 
