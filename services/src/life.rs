@@ -266,7 +266,8 @@ pub fn enter_realtime(service: &Service, process: Process) -> RealtimeReport {
         return RealtimeReport::default();
     }
     let settings = &service.stack.realtime;
-    let timed = process.on_control_path() || process == Process::Supervisor;
+    let timed =
+        process.on_control_path() || matches!(process, Process::Supervisor | Process::Vehicle);
     let cores = settings.cores.clone().filter(|_| process.on_control_path());
     let report = kerbside_runtime::enter_realtime(&RealtimeRequest {
         priority: timed.then_some(settings.priority),

@@ -4,6 +4,7 @@
 
 use core::time::Duration;
 
+use kerbside_geometry::{Vehicle, math};
 use kerbside_messages::{
     Cause, EstimatorState, Mode, Nanos, Odometry, OperatorAnswer, PlanAnswer, PlanVerdict, Process,
     State, text,
@@ -15,8 +16,10 @@ const PATIENCE: Duration = Duration::from_secs(30);
 const ANSWER: Duration = Duration::from_secs(1);
 /// State that is older than this means that the supervisor is gone.
 const STATE_AGE: Duration = Duration::from_secs(1);
-/// The vehicle stands so long before the manoeuvre is judged.
-const SETTLE: Duration = Duration::from_millis(500);
+/// The vehicle stands so long before the manoeuvre is judged \[s\]: besides the time its actuators take to rest.
+const SETTLE: f64 = 0.5;
+/// Speed below which a vehicle stands \[m/s\].
+const REST: f64 = 1e-3;
 /// Longest drive beyond the plan's own duration.
 const OVERTIME: Duration = Duration::from_secs(20);
 
@@ -117,6 +120,7 @@ pub struct Manoeuvre {
     asked: Option<Nanos>,
     fixed: bool,
     rearm: bool,
+    settle: Nanos,
     drive_limit: Nanos,
     heard: Option<(u64, Nanos)>,
 }
@@ -124,13 +128,14 @@ pub struct Manoeuvre {
 impl Manoeuvre {
     /// A manoeuvre that begins at `now`; after a fault it is armed again where `rearm`.
     #[must_use]
-    pub fn new(now: Nanos, rearm: bool) -> Self {
+    pub fn new(now: Nanos, vehicle: &Vehicle, rearm: bool) -> Self {
         Self {
             phase: Phase::Waiting,
             since: now,
             asked: None,
             fixed: false,
             rearm,
+            settle: settling_time(vehicle),
             drive_limit: 0,
             heard: None,
         }
@@ -313,7 +318,7 @@ impl Manoeuvre {
 
     fn settling(&mut self, now: Nanos, seen: &Observation<'_>) -> Act {
         let stands = seen.odometry.is_some_and(|odometry| odometry.standstill == 1);
-        if stands && now.saturating_sub(self.since) >= span(SETTLE) {
+        if stands && now.saturating_sub(self.since) >= self.settle {
             return Act::End(End::Completed);
         }
         self.overdue(now, "the vehicle does not come to rest")
@@ -353,6 +358,13 @@ impl Manoeuvre {
         self.since = now;
         self.asked = None;
     }
+}
+
+/// A lag comes to rest like an exponential: from full speed to what counts as rest.
+fn settling_time(vehicle: &Vehicle) -> Nanos {
+    let response = vehicle.response();
+    let decay = math::ln((vehicle.limits.speed / REST).max(1.0));
+    kerbside_messages::nanos(SETTLE + response.speed_delay + decay * response.speed_lag)
 }
 
 fn span(duration: Duration) -> Nanos {

@@ -4,4 +4,4 @@
 mod channel;
 mod world;
 
-pub use world::{LineFault, World, words_of};
+pub use world::{LineFault, Script, World, words_of};

@@ -32,6 +32,17 @@ const PLAN: Nanos = 500_000_000;
 /// Where simulated time begins: stamps are never 0.
 const EPOCH: Nanos = 1_000_000_000;
 
+/// What happens to a world besides its own course. Times are simulated ones since the beginning \[ns\].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Script {
+    /// What happens to the line from the vehicle.
+    pub line: Vec<LineFault>,
+    /// Processes that end as by `kill -9`.
+    pub kills: Vec<(Nanos, Process)>,
+    /// When somebody inhibits motion, and for how long.
+    pub inhibits: Vec<(Nanos, Nanos)>,
+}
+
 /// What a script does to the line from the vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LineFault {
@@ -80,7 +91,7 @@ pub struct World {
     vehicle_due: Nanos,
     to_host: ByteQueue,
     to_vehicle: ByteQueue,
-    faults: Vec<LineFault>,
+    script: Script,
     buffer: Vec<u8>,
     stages: Stages,
     channels: Channels,
@@ -126,11 +137,7 @@ impl World {
     ///
     /// # Errors
     /// [`Failure`] where the vehicle has nothing to compute motion from.
-    pub fn new(
-        service: &Service,
-        making: &Making,
-        faults: Vec<LineFault>,
-    ) -> Result<Self, Failure> {
+    pub fn new(service: &Service, making: &Making, script: Script) -> Result<Self, Failure> {
         let supervised: Vec<_> = service
             .supervised()
             .into_iter()
@@ -147,7 +154,7 @@ impl World {
             vehicle,
             to_host: ByteQueue::new(LINE_DELAY),
             to_vehicle: ByteQueue::new(LINE_DELAY),
-            faults,
+            script,
             buffer: Vec::new(),
             stages,
             channels: Channels::new(),
@@ -245,11 +252,21 @@ impl World {
         self.event(Event::Operator { id, verb });
     }
 
-    /// Forbids motion.
-    pub fn inhibit(&mut self, inhibit: &Inhibit) {
-        let mut sealed = *inhibit;
-        seal(&mut sealed, &[], EPOCH, self.now, self.now);
-        self.pending_inhibit = Some(sealed);
+    fn follow_script(&mut self) {
+        let elapsed = self.elapsed();
+        for index in 0..self.script.kills.len() {
+            let (at, process) = self.script.kills[index];
+            if at == elapsed {
+                self.kill(process);
+            }
+        }
+        let inhibit = self.script.inhibits.iter().find(|(at, _)| *at == elapsed);
+        if let Some((_, span)) = inhibit {
+            let (who, why) = (text::from_str("script"), text::from_str("scripted inhibit"));
+            let mut sealed = Inhibit { expiry: self.now + span, who, why, ..Inhibit::default() };
+            seal(&mut sealed, &[], EPOCH, self.now, self.now);
+            self.pending_inhibit = Some(sealed);
+        }
     }
 
     /// Asks the planner; the answer comes half a simulated second later.
@@ -289,6 +306,7 @@ impl World {
     pub fn tick(&mut self) {
         self.now += TICK;
         self.fresh = Fresh::default();
+        self.follow_script();
         self.start_processes();
         self.drive_vehicle();
         self.hear_line();
@@ -322,7 +340,7 @@ impl World {
         let elapsed = self.now - EPOCH;
         let came = self.to_host.is_due(self.now);
         self.to_host.take(self.now, &mut self.buffer);
-        for fault in &self.faults {
+        for fault in &self.script.line {
             match fault {
                 LineFault::Silence { from, to } if (*from..*to).contains(&elapsed) => {
                     self.buffer.clear()

@@ -67,7 +67,7 @@ fn operate(
     progress: &Progress,
     stop: &AtomicBool,
 ) -> End {
-    let mut manoeuvre = Manoeuvre::new(now(), job.rearm);
+    let mut manoeuvre = Manoeuvre::new(now(), &job.service.vehicle, job.rearm);
     let mut look = Ticker::new(LOOK);
     loop {
         desk.take_in(trace);

@@ -5,7 +5,7 @@ mod live;
 mod progress;
 mod report;
 mod scene;
-mod simulated;
+pub mod simulated;
 mod summary;
 pub mod trace;
 
@@ -16,6 +16,7 @@ use kerbside_runtime::Instance;
 use kerbside_settings::Scenario;
 
 use crate::exit::{Exit, Failure};
+use crate::lockstep::Script;
 use crate::manoeuvre::End;
 use crate::service::{Service, ServiceArgs};
 use crate::{configuration, output};
@@ -148,7 +149,7 @@ pub fn run(args: &ParkArgs) -> Result<Exit, Failure> {
 fn run_one(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Finished, Failure> {
     let job = job(args, seed, folder)?;
     let run = if job.lockstep {
-        simulated::run(&job, Vec::new())?
+        simulated::run(&job, Script::default())?
     } else {
         let progress = Progress::new(args.headless);
         if args.instance.is_none() {

@@ -6,7 +6,7 @@ use super::scene::Start;
 use super::trace::Trace;
 use super::{Job, Run};
 use crate::exit::Failure;
-use crate::lockstep::{LineFault, World};
+use crate::lockstep::{Script, World};
 use crate::manoeuvre::{Act, Manoeuvre, Observation};
 use crate::vehicle::Making;
 
@@ -17,7 +17,7 @@ const LOOK: Nanos = 20_000_000;
 ///
 /// # Errors
 /// [`Failure`] where the vehicle has nothing to compute motion from.
-pub fn run(job: &Job, faults: Vec<LineFault>) -> Result<Run, Failure> {
+pub fn run(job: &Job, script: Script) -> Result<Run, Failure> {
     let begun = kerbside_runtime::now();
     let scenario = &job.scenario;
     let start = Start::draw(scenario, job.seed);
@@ -28,9 +28,9 @@ pub fn run(job: &Job, faults: Vec<LineFault>) -> Result<Run, Failure> {
         boot: 1,
         silence: job.service.safety().timeouts.vehicle_silence,
     };
-    let mut world = World::new(&job.service, &making, faults)?;
+    let mut world = World::new(&job.service, &making, script)?;
     let mut trace = Trace::new(world.now());
-    let mut manoeuvre = Manoeuvre::new(world.now(), job.rearm);
+    let mut manoeuvre = Manoeuvre::new(world.now(), &job.service.vehicle, job.rearm);
     let mut look_due = world.now();
     let mut plans = 0;
     let end = loop {

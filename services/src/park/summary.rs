@@ -177,7 +177,7 @@ fn sentence(one: &Finished) -> String {
 fn pose_in_words(pose: Option<Pose>) -> String {
     pose.map_or("-".to_owned(), |pose| {
         let (x, y) = (1e3 * pose.x, 1e3 * pose.y);
-        format!("x {x:+.1} mm  y {y:+.1} mm  yaw {:+.2}°", angle::degrees(pose.yaw))
+        format!("x {x:+.1} mm, y {y:+.1} mm, yaw {:+.2}°", angle::degrees(pose.yaw))
     })
 }
 
@@ -190,7 +190,7 @@ fn latency_in_words(one: &Finished) -> String {
 fn print_many(finished: &[Finished], figures: &[Figure]) {
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED);
-    table.set_header(["seed", "verdict", "end error", "gears", "time", "clearance"]);
+    table.set_header(["seed", "verdict", "x, y mm, yaw °", "gears", "time s", "clearance cm"]);
     for one in finished {
         let verdict = &one.verdict;
         let words = if verdict.parked {
@@ -201,12 +201,15 @@ fn print_many(finished: &[Finished], figures: &[Figure]) {
         table.add_row([
             one.job.seed.to_string(),
             words,
-            pose_in_words(verdict.end_error),
+            verdict.end_error.map_or("-".to_owned(), |error| {
+                let yaw = angle::degrees(error.yaw);
+                format!("{:+6.1} {:+6.1} {yaw:+6.2}", 1e3 * error.x, 1e3 * error.y)
+            }),
             verdict.gear_changes.to_string(),
-            format!("{:.1} s", verdict.duration),
+            format!("{:.1}", verdict.duration),
             verdict
                 .clearance
-                .map_or("-".to_owned(), |clearance| format!("{:.1} cm", 100.0 * clearance)),
+                .map_or("-".to_owned(), |clearance| format!("{:.1}", 100.0 * clearance)),
         ]);
     }
     println!("{table}");

@@ -17,7 +17,7 @@ use kerbside_runtime::{FileLock, LockError, Ticker, now, poll_readable};
 pub use stage::{Making, VehicleStage};
 
 use crate::exit::{Exit, Failure};
-use crate::life::stop_flag;
+use crate::life::{self, stop_flag};
 use crate::service::{Service, ServiceArgs};
 use pty::Pty;
 use reporter::Reporter;
@@ -78,6 +78,8 @@ pub fn run(args: &VehicleArgs, service: Service) -> Result<Exit, Failure> {
     let _lock = take_lock(&service)?;
     let mut pty = Pty::create(&service.instance.vehicle_link()).map_err(Failure::internal)?;
     let reporter = Reporter::start(&service.instance)?;
+    // After the reporter's thread, which need not be in time.
+    life::enter_realtime(&service, Process::Vehicle);
     let mut stage = VehicleStage::new(&Making {
         vehicle: service.vehicle.clone(),
         start: args.start,

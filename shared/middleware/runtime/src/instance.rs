@@ -166,10 +166,13 @@ impl Instance {
     pub fn create_folder(&self) -> Result<(), InstanceError> {
         let wrap = |source| InstanceError::File { path: self.folder.clone(), source };
         fs::DirBuilder::new().recursive(true).mode(0o700).create(&self.folder).map_err(wrap)?;
-        let owner = fs::metadata(&self.folder).map_err(wrap)?.uid();
         let user = rustix::process::geteuid().as_raw();
-        if owner != user {
-            return Err(InstanceError::Foreign { folder: self.folder.clone(), owner, user });
+        // The folder above too: who owns that could put another instance in the place of this one.
+        for folder in self.folder.ancestors().take(2) {
+            let owner = fs::metadata(folder).map_err(wrap)?.uid();
+            if owner != user {
+                return Err(InstanceError::Foreign { folder: folder.to_owned(), owner, user });
+            }
         }
         Ok(())
     }

@@ -1,0 +1,205 @@
+//! The stack in lockstep: it parks from many starts, gives the same bits for the same seed, and survives scripted
+//! faults as the processes do.
+
+// The helpers of a test unwrap as its functions do.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+use clap::Parser;
+use kerbside::lockstep::{LineFault, Script};
+use kerbside::manoeuvre::End;
+use kerbside::park::judge::{Verdict, judge};
+use kerbside::park::{Job, ParkArgs, Run, job, simulated};
+use kerbside_messages::{AlterReason, Cause, EstimatorState, Mode, Nanos, Process};
+
+#[derive(Parser)]
+struct Arguments {
+    #[command(flatten)]
+    park: ParkArgs,
+}
+
+const SECOND: Nanos = 1_000_000_000;
+
+fn job_of(words: &[&str], seed: u64) -> Job {
+    let words = ["park"].iter().chain(words).chain(&["--lockstep"]);
+    let arguments = Arguments::parse_from(words);
+    job(&arguments.park, seed, Path::new("/nonexistent")).unwrap()
+}
+
+fn drive(words: &[&str], seed: u64, script: Script) -> (Run, Verdict) {
+    let job = job_of(words, seed);
+    let run = simulated::run(&job, script).unwrap();
+    let verdict = judge(&run.trace, &job.scenario, &job.service.vehicle, run.end);
+    (run, verdict)
+}
+
+/// When the car of seed 1 is well on its way in the garage scene.
+fn under_way() -> Nanos {
+    let (run, _) = drive(&["garage"], 1, Script::default());
+    let moving = run.trace.truth.iter().find(|truth| truth.distance > 0.3).unwrap();
+    // Kills fall on the grid of simulated time.
+    moving.header.stamp / 1_000_000 * 1_000_000 - SECOND
+}
+
+/// The greatest distance rolled after `since`, over the distance at that time.
+fn rolled_after(run: &Run, since: Nanos) -> f64 {
+    let at = |stamp: Nanos| {
+        run.trace.truth.iter().find(|truth| truth.header.stamp >= stamp).unwrap().distance
+    };
+    let last = run.trace.truth.last().unwrap().distance;
+    last - at(since + SECOND)
+}
+
+#[test]
+fn every_scene_is_parked_from_disturbed_starts() {
+    for scene in ["garage", "parallel", "garage-full-size", "parallel-full-size"] {
+        let (mut positions, mut headings) = (0.0, 0.0);
+        for seed in 1..=5 {
+            let (run, verdict) = drive(&[scene], seed, Script::default());
+            assert!(verdict.parked, "{scene}, seed {seed}: {:?} {}", run.end, verdict.cause);
+            let error = verdict.end_error.unwrap();
+            positions += error.x.hypot(error.y) / 5.0;
+            headings += error.yaw.abs() / 5.0;
+        }
+        let scale = if scene.ends_with("full-size") { 6.0 } else { 1.0 };
+        assert!(positions < 0.010 * scale, "{scene}: mean position error {positions} m");
+        assert!(headings < 0.6_f64.to_radians(), "{scene}: mean heading error {headings} rad");
+    }
+}
+
+#[test]
+fn gear_changes_and_clearances_keep_to_the_scenes() {
+    for (scene, changes, clearance) in [("garage", 1, 0.05), ("parallel", 4, 0.03)] {
+        let (run, verdict) = drive(&[scene], 2, Script::default());
+        let plan = &run.trace.plans[0].head;
+        assert!(plan.gear_changes <= changes && plan.clearance >= clearance, "{scene}: {plan:?}");
+        assert!(plan.steering <= 28.0_f64.to_radians() + 1e-9, "{scene}: {plan:?}");
+        assert_eq!(verdict.gear_changes, plan.gear_changes, "{scene}");
+        assert!(!verdict.collision);
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits() {
+    let bits = |run: &Run| -> Vec<u8> {
+        let odometry =
+            run.trace.odometry.iter().flat_map(|sample| bytemuck::bytes_of(sample).to_vec());
+        let commands =
+            run.trace.commands.iter().flat_map(|sample| bytemuck::bytes_of(sample).to_vec());
+        let truth = run.trace.truth.iter().flat_map(|sample| bytemuck::bytes_of(sample).to_vec());
+        odometry.chain(commands).chain(truth).collect()
+    };
+    let (one, _) = drive(&["parallel"], 7, Script::default());
+    let (two, _) = drive(&["parallel"], 7, Script::default());
+    let (other, _) = drive(&["parallel"], 8, Script::default());
+    assert!(bits(&one) == bits(&two), "two runs of seed 7 differ");
+    assert!(bits(&one) != bits(&other), "seeds 7 and 8 are one run");
+}
+
+#[test]
+fn a_death_on_the_control_path_stops_the_car_and_is_named() {
+    let at = under_way();
+    for process in [
+        Process::Interface,
+        Process::Ingest,
+        Process::Estimator,
+        Process::Tracker,
+        Process::Actuation,
+    ] {
+        let script = Script { kills: vec![(at, process)], ..Script::default() };
+        let (run, verdict) = drive(&["garage"], 1, script);
+        assert_eq!(run.end, End::Stopped(Cause::Died), "{process}: {}", verdict.cause);
+        assert!(verdict.cause.contains(process.name()), "{process}: {}", verdict.cause);
+        assert!(!verdict.parked && !verdict.collision, "{process}");
+        let rolled = rolled_after(&run, at);
+        assert!(rolled < 0.15, "{process}: rolled {rolled} m at 0.2 m/s");
+        assert_eq!(run.trace.state.unwrap().mode(), Mode::Faulted, "{process}");
+    }
+}
+
+#[test]
+fn after_a_death_the_operator_completes_the_manoeuvre() {
+    let at = under_way();
+    for process in [
+        Process::Interface,
+        Process::Ingest,
+        Process::Estimator,
+        Process::Tracker,
+        Process::Actuation,
+    ] {
+        let script = Script { kills: vec![(at, process)], ..Script::default() };
+        let (run, verdict) = drive(&["garage", "--rearm"], 1, script);
+        assert!(verdict.parked, "{process}: {:?} {}", run.end, verdict.cause);
+        assert_eq!(run.trace.restarts(), 1, "{process}");
+        assert!(run.trace.plans.len() >= 2, "{process}: planned anew");
+        let lost = |state: u8| state == EstimatorState::Lost.code();
+        assert!(
+            !run.trace.odometry.iter().any(|odometry| lost(odometry.state)),
+            "{process}: pose lost"
+        );
+    }
+}
+
+#[test]
+fn the_death_of_planner_or_recorder_does_not_stop_the_car() {
+    let at = under_way();
+    for process in [Process::Planner, Process::Recorder] {
+        let script = Script { kills: vec![(at, process)], ..Script::default() };
+        let (run, verdict) = drive(&["garage"], 1, script);
+        assert!(verdict.parked, "{process}: {:?} {}", run.end, verdict.cause);
+        assert_eq!((run.trace.restarts(), run.trace.plans.len()), (1, 1), "{process}");
+    }
+}
+
+#[test]
+fn an_inhibit_stops_the_car_until_somebody_arms() {
+    let at = under_way();
+    let script = Script { inhibits: vec![(at, SECOND)], ..Script::default() };
+    let (run, verdict) = drive(&["garage"], 1, script.clone());
+    assert_eq!(run.end, End::Stopped(Cause::Inhibited), "{}", verdict.cause);
+    assert!(rolled_after(&run, at) < 0.10);
+    let (run, verdict) = drive(&["garage", "--rearm"], 1, script);
+    assert!(verdict.parked, "{:?} {}", run.end, verdict.cause);
+    let latched = |code: u8| code == AlterReason::Inhibited.code();
+    assert!(run.trace.actuators.iter().any(|actuator| latched(actuator.latch)));
+}
+
+#[test]
+fn a_lost_line_stops_the_car_and_its_return_is_found() {
+    let at = under_way();
+    let silence = LineFault::Silence { from: at, to: at + 600_000_000 };
+    let script = Script { line: vec![silence], ..Script::default() };
+    let (run, verdict) = drive(&["garage"], 1, script.clone());
+    assert!(matches!(run.end, End::Stopped(_)), "{:?} {}", run.end, verdict.cause);
+    assert!(rolled_after(&run, at) < 0.15);
+    let (run, verdict) = drive(&["garage", "--rearm"], 1, script);
+    assert!(verdict.parked, "{:?} {}", run.end, verdict.cause);
+}
+
+#[test]
+fn garbage_on_the_line_costs_nothing_but_itself() {
+    let at = under_way();
+    let garbage = |at: Nanos| LineFault::Garbage { at, bytes: (0..200_u8).collect() };
+    let line = (0..50).map(|index| garbage(at + index * 10_000_000)).collect();
+    let (run, verdict) = drive(&["garage"], 1, Script { line, ..Script::default() });
+    assert!(verdict.parked, "{:?} {}", run.end, verdict.cause);
+    assert_eq!(run.trace.restarts(), 0);
+}
+
+#[test]
+fn two_deaths_at_once_are_survived() {
+    let at = under_way();
+    let kills = vec![(at, Process::Ingest), (at, Process::Estimator)];
+    let (run, verdict) = drive(&["garage", "--rearm"], 1, Script { kills, ..Script::default() });
+    assert!(verdict.parked, "{:?} {}", run.end, verdict.cause);
+    assert_eq!(run.trace.restarts(), 2);
+}
+
+#[test]
+fn a_process_that_keeps_dying_is_given_up() {
+    let at = under_way();
+    let kills = (0..40).map(|index| (at + index * SECOND, Process::Tracker)).collect();
+    let (run, verdict) = drive(&["garage", "--rearm"], 1, Script { kills, ..Script::default() });
+    assert_eq!(run.end, End::Stopped(Cause::GaveUp), "{}", verdict.cause);
+}
