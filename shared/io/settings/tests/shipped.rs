@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use kerbside_geometry::{Actuators, Drive};
+use kerbside_geometry::Drive;
 use kerbside_settings::*;
 
 fn repository() -> PathBuf {
@@ -47,16 +47,7 @@ fn nothing_shipped_has_a_problem() {
 #[test]
 fn the_1_6_car_is_the_papers() {
     let vehicle = Sources::compiled_in().vehicle("paper-1-6").unwrap().value.vehicle;
-    assert_eq!(vehicle.wheelbase, 0.5);
-    assert_eq!(vehicle.radius, [0.0725; 4]);
-    assert_eq!((vehicle.track_front, vehicle.track_rear), (0.31, 0.31));
-    assert_eq!(vehicle.drive, Drive::Rear);
-    assert_eq!(vehicle.limits.deceleration, vehicle.limits.acceleration);
-    let response =
-        Actuators { speed_delay: 0.02, speed_lag: 0.1, steering_delay: 0.02, steering_lag: 0.05 };
-    assert_eq!(vehicle.actuators, Some(response));
-    assert_eq!(vehicle.encoders.unwrap().counts_per_revolution, [Some(2048.0); 4]);
-    assert_eq!(vehicle.gyro, None);
+    assert_eq!(vehicle, kerbside_geometry::Vehicle::paper_car());
 }
 
 #[test]

@@ -28,7 +28,7 @@ pub enum InstanceError {
     },
     /// The run-time folder is too deep for socket paths.
     #[error(
-        "{folder}: the run-time folder's path has {length} bytes, {allowed} are allowed; set XDG_RUNTIME_DIR to a shorter one"
+        "{folder}: {length} bytes of path, {allowed} leave room for the sockets in it; set XDG_RUNTIME_DIR to a shorter folder, or take a shorter name for the instance"
     )]
     TooDeep {
         /// The folder.

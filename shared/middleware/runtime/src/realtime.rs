@@ -57,7 +57,7 @@ pub fn enter_realtime(request: &RealtimeRequest) -> RealtimeReport {
 }
 
 fn schedule(priority: u8) -> Result<(), String> {
-    let value = priority.try_into().map_err(|error| format!("{error}"))?;
+    let value = priority.try_into().map_err(|error: &str| error.to_owned())?;
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy)
         .map_err(|error| format!("{error:?}"))

@@ -8,6 +8,7 @@ use iceoryx2::prelude::{
 use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use iceoryx2::service::builder::request_response::RequestResponseOpenError;
+use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 use kerbside_messages::{Message, Plan, Process};
 
 use crate::error::{Context, RuntimeError};
@@ -134,12 +135,7 @@ impl Session {
         &self,
         process: Option<Process>,
     ) -> Result<Publisher<M>, SessionError> {
-        let factory = self
-            .node
-            .service_builder(&service_name(M::TOPIC, process)?)
-            .publish_subscribe::<Wire<M>>()
-            .open()
-            .map_err(|error| self.publish_subscribe_error::<M>(error))?;
+        let factory = self.topic::<M>(process)?;
         let port = factory
             .publisher_builder()
             .max_loaned_samples(2)
@@ -158,12 +154,7 @@ impl Session {
         process: Option<Process>,
         buffer: usize,
     ) -> Result<Subscriber<M>, SessionError> {
-        let factory = self
-            .node
-            .service_builder(&service_name(M::TOPIC, process)?)
-            .publish_subscribe::<Wire<M>>()
-            .open()
-            .map_err(|error| self.publish_subscribe_error::<M>(error))?;
+        let factory = self.topic::<M>(process)?;
         let port = factory
             .subscriber_builder()
             .buffer_size(buffer)
@@ -177,13 +168,7 @@ impl Session {
     /// # Errors
     /// [`SessionError`].
     pub fn plan_publisher(&self) -> Result<PlanPublisher, SessionError> {
-        let factory = self
-            .node
-            .service_builder(&service_name(Plan::TOPIC, None)?)
-            .publish_subscribe::<[WirePoint]>()
-            .user_header::<Wire<Plan>>()
-            .open()
-            .map_err(|error| self.publish_subscribe_error::<Plan>(error))?;
+        let factory = self.plans()?;
         let port = factory
             .publisher_builder()
             .initial_max_slice_len(kerbside_messages::MAX_PLAN_POINTS)
@@ -197,13 +182,7 @@ impl Session {
     /// # Errors
     /// [`SessionError`].
     pub fn plan_subscriber(&self) -> Result<PlanSubscriber, SessionError> {
-        let factory = self
-            .node
-            .service_builder(&service_name(Plan::TOPIC, None)?)
-            .publish_subscribe::<[WirePoint]>()
-            .user_header::<Wire<Plan>>()
-            .open()
-            .map_err(|error| self.publish_subscribe_error::<Plan>(error))?;
+        let factory = self.plans()?;
         let port = factory
             .subscriber_builder()
             .buffer_size(1)
@@ -217,12 +196,7 @@ impl Session {
     /// # Errors
     /// [`SessionError`].
     pub fn server<Q: Message, A: Message>(&self) -> Result<Server<Q, A>, SessionError> {
-        let factory = self
-            .node
-            .service_builder(&service_name(Q::TOPIC, None)?)
-            .request_response::<Wire<Q>, Wire<A>>()
-            .open()
-            .map_err(|error| self.request_response_error::<Q>(error))?;
+        let factory = self.door::<Q, A>()?;
         let port = factory.server_builder().create().context("create server", Q::TOPIC.name)?;
         Ok(Server::new(port))
     }
@@ -232,12 +206,7 @@ impl Session {
     /// # Errors
     /// [`SessionError`].
     pub fn client<Q: Message, A: Message>(&self) -> Result<Client<Q, A>, SessionError> {
-        let factory = self
-            .node
-            .service_builder(&service_name(Q::TOPIC, None)?)
-            .request_response::<Wire<Q>, Wire<A>>()
-            .open()
-            .map_err(|error| self.request_response_error::<Q>(error))?;
+        let factory = self.door::<Q, A>()?;
         let port = factory.client_builder().create().context("create client", Q::TOPIC.name)?;
         Ok(Client::new(port, self.notifier::<Q>()?))
     }
@@ -247,12 +216,7 @@ impl Session {
     /// # Errors
     /// [`SessionError`].
     pub fn listener<M: Message>(&self) -> Result<Listener, SessionError> {
-        let factory = self
-            .node
-            .service_builder(&service_name(M::TOPIC, None)?)
-            .event()
-            .open()
-            .map_err(|error| self.event_error::<M>(error))?;
+        let factory = self.event::<M>()?;
         Ok(Listener::new(
             factory.listener_builder().create().context("create listener", M::TOPIC.name)?,
             M::TOPIC.name,
@@ -260,15 +224,53 @@ impl Session {
     }
 
     fn notifier<M: Message>(&self) -> Result<Notifier, SessionError> {
-        let factory = self
-            .node
-            .service_builder(&service_name(M::TOPIC, None)?)
-            .event()
-            .open()
-            .map_err(|error| self.event_error::<M>(error))?;
+        let factory = self.event::<M>()?;
         Ok(Notifier::new(
             factory.notifier_builder().create().context("create notifier", M::TOPIC.name)?,
         ))
+    }
+
+    fn topic<M: Message>(
+        &self,
+        process: Option<Process>,
+    ) -> Result<publish_subscribe::PortFactory<ipc::Service, Wire<M>, ()>, SessionError> {
+        self.node
+            .service_builder(&service_name(M::TOPIC, process)?)
+            .publish_subscribe::<Wire<M>>()
+            .open()
+            .map_err(|error| self.publish_subscribe_error::<M>(error))
+    }
+
+    fn plans(
+        &self,
+    ) -> Result<publish_subscribe::PortFactory<ipc::Service, [WirePoint], Wire<Plan>>, SessionError>
+    {
+        self.node
+            .service_builder(&service_name(Plan::TOPIC, None)?)
+            .publish_subscribe::<[WirePoint]>()
+            .user_header::<Wire<Plan>>()
+            .open()
+            .map_err(|error| self.publish_subscribe_error::<Plan>(error))
+    }
+
+    #[allow(clippy::type_complexity)] // the middleware's own five parameters
+    fn door<Q: Message, A: Message>(
+        &self,
+    ) -> Result<request_response::PortFactory<ipc::Service, Wire<Q>, (), Wire<A>, ()>, SessionError>
+    {
+        self.node
+            .service_builder(&service_name(Q::TOPIC, None)?)
+            .request_response::<Wire<Q>, Wire<A>>()
+            .open()
+            .map_err(|error| self.request_response_error::<Q>(error))
+    }
+
+    fn event<M: Message>(&self) -> Result<event::PortFactory<ipc::Service>, SessionError> {
+        self.node
+            .service_builder(&service_name(M::TOPIC, None)?)
+            .event()
+            .open()
+            .map_err(|error| self.event_error::<M>(error))
     }
 
     fn missing<M: Message>(&self) -> SessionError {

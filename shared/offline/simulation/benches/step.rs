@@ -7,9 +7,7 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use kerbside_geometry::{
-    Actuators, Drive, Encoders, Footprint, Gyro, Limits, Pose, SteeringSensor, Vehicle,
-};
+use kerbside_geometry::{Gyro, Pose, Vehicle};
 use kerbside_simulation::{Noise, STEP, Simulator};
 
 // Blocks far shorter than a time slice: the median is one that ran without interruption even on a
@@ -19,37 +17,7 @@ const STEPS: u32 = 2_000;
 const AIM: f64 = 30_000.0;
 
 fn vehicle() -> Vehicle {
-    Vehicle {
-        name: "paper-1-6".to_owned(),
-        wheelbase: 0.5,
-        track_front: 0.31,
-        track_rear: 0.31,
-        radius: [0.0725; 4],
-        drive: Drive::Rear,
-        footprint: Footprint { length: 0.75, width: 0.37, rear_overhang: 0.13 },
-        limits: Limits {
-            speed: 0.5,
-            acceleration: 0.3,
-            deceleration: 0.3,
-            steering: core::f64::consts::FRAC_PI_6,
-            steering_rate: 0.8,
-        },
-        actuators: Some(Actuators {
-            speed_delay: 0.02,
-            speed_lag: 0.1,
-            steering_delay: 0.02,
-            steering_lag: 0.05,
-        }),
-        encoders: Some(Encoders {
-            counts_per_revolution: [Some(2048.0); 4],
-            counter_bits: 32,
-            noise_per_distance: None,
-            rate: 200.0,
-        }),
-        steering_sensor: Some(SteeringSensor { noise: 0.0035, rate: 200.0 }),
-        gyro: Some(Gyro { noise: 0.003, rate: 200.0 }),
-        reference: None,
-    }
+    Vehicle { gyro: Some(Gyro { noise: 0.003, rate: 200.0 }), ..Vehicle::paper_car() }
 }
 
 /// Nanoseconds per step of a drive whose commands change every 50 ms, so that nothing ever settles.

@@ -6,6 +6,7 @@
 pub mod angle;
 mod footprint;
 pub mod math;
+mod paper_car;
 mod polygon;
 mod pose;
 mod vehicle;

@@ -126,35 +126,16 @@ fn power_of_two(bits: u32) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use kerbside_geometry::{Drive, Encoders, Footprint, Limits, SteeringSensor};
+    use kerbside_geometry::Limits;
 
     /// The 1:6 car of the paper with its own wheels and tracks (Tables 1 and 2).
     pub(crate) fn car() -> Vehicle {
         Vehicle {
-            name: "paper-1-6".to_owned(),
-            wheelbase: 0.5,
             track_front: 0.285,
             track_rear: 0.292,
             radius: [0.07097, 0.07114, 0.069515, 0.069605],
-            drive: Drive::Rear,
-            footprint: Footprint { length: 0.75, width: 0.37, rear_overhang: 0.13 },
-            limits: Limits {
-                speed: 0.5,
-                acceleration: 0.3,
-                deceleration: 0.3,
-                steering: 0.6109,
-                steering_rate: 0.8,
-            },
-            actuators: None,
-            encoders: Some(Encoders {
-                counts_per_revolution: [Some(2048.0); 4],
-                counter_bits: 32,
-                noise_per_distance: None,
-                rate: 200.0,
-            }),
-            steering_sensor: Some(SteeringSensor { noise: 0.0035, rate: 200.0 }),
-            gyro: None,
-            reference: None,
+            limits: Limits { steering: 0.6109, ..Vehicle::paper_car().limits },
+            ..Vehicle::paper_car()
         }
     }
 

@@ -87,17 +87,11 @@ impl Pace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kerbside_geometry::{Actuators, Drive, Footprint, Limits};
+    use kerbside_geometry::{Actuators, Limits};
 
     fn vehicle() -> Vehicle {
         Vehicle {
-            name: String::new(),
             wheelbase: 2.0,
-            track_front: 1.0,
-            track_rear: 1.0,
-            radius: [0.3; 4],
-            drive: Drive::Rear,
-            footprint: Footprint { length: 3.0, width: 1.5, rear_overhang: 0.5 },
             limits: Limits {
                 speed: 1.0,
                 acceleration: 0.4,
@@ -110,10 +104,7 @@ mod tests {
                 steering_lag: 0.2,
                 ..Actuators::default()
             }),
-            encoders: None,
-            steering_sensor: None,
-            gyro: None,
-            reference: None,
+            ..Vehicle::paper_car()
         }
     }
 

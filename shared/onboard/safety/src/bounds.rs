@@ -273,35 +273,15 @@ fn counts(settings: &SafetySettings) -> impl Iterator<Item = BoundError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kerbside_geometry::{Actuators, Drive, Footprint, Limits};
+    use kerbside_geometry::{Actuators, Limits};
 
     fn vehicle(limits: Limits, speed_delay: f64, speed_lag: f64) -> Vehicle {
-        Vehicle {
-            name: "test".into(),
-            wheelbase: 0.5,
-            track_front: 0.3,
-            track_rear: 0.3,
-            radius: [0.05; 4],
-            drive: Drive::Rear,
-            footprint: Footprint { length: 0.75, width: 0.37, rear_overhang: 0.13 },
-            limits,
-            actuators: Some(Actuators { speed_delay, speed_lag, ..Actuators::default() }),
-            encoders: None,
-            steering_sensor: None,
-            gyro: None,
-            reference: None,
-        }
+        let actuators = Some(Actuators { speed_delay, speed_lag, ..Actuators::default() });
+        Vehicle { limits, actuators, ..Vehicle::paper_car() }
     }
 
     fn small_car() -> Vehicle {
-        let limits = Limits {
-            speed: 0.5,
-            acceleration: 0.3,
-            deceleration: 0.3,
-            steering: 0.52,
-            steering_rate: 1.0,
-        };
-        vehicle(limits, 0.02, 0.10)
+        Vehicle::paper_car()
     }
 
     fn full_size(speed: f64, lag: f64) -> Vehicle {

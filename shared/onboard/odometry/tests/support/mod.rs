@@ -3,9 +3,7 @@
 #![allow(dead_code)] // Each test takes what it needs.
 #![allow(clippy::unwrap_used)] // Helpers of tests are tests.
 
-use kerbside_geometry::{
-    Drive, Encoders, Footprint, Gyro, Limits, Pose, SteeringSensor, Vehicle, WHEELS,
-};
+use kerbside_geometry::{Encoders, Gyro, Limits, Pose, Vehicle, WHEELS};
 use kerbside_messages::{Header, Odometry, Raw, Travel};
 use kerbside_odometry::{
     Estimator, EstimatorInputs, EstimatorSettings, Ingest, IngestSettings, Sensors, WheelSignal,
@@ -18,20 +16,10 @@ use rand_pcg::Pcg64;
 /// a turn.
 pub(crate) fn car() -> Vehicle {
     Vehicle {
-        name: "paper-1-6".to_owned(),
-        wheelbase: 0.5,
         track_front: 0.285,
         track_rear: 0.292,
         radius: [0.07097, 0.07114, 0.069515, 0.069605],
-        drive: Drive::Rear,
-        footprint: Footprint { length: 0.75, width: 0.37, rear_overhang: 0.13 },
-        limits: Limits {
-            speed: 0.5,
-            acceleration: 0.3,
-            deceleration: 0.3,
-            steering: 0.6109,
-            steering_rate: 0.8,
-        },
+        limits: Limits { steering: 0.6109, ..Vehicle::paper_car().limits },
         actuators: None,
         encoders: Some(Encoders {
             counts_per_revolution: [Some(2000.0); 4],
@@ -39,9 +27,9 @@ pub(crate) fn car() -> Vehicle {
             noise_per_distance: None,
             rate: 200.0,
         }),
-        steering_sensor: Some(SteeringSensor { noise: 0.0035, rate: 200.0 }),
         gyro: Some(Gyro { noise: 0.003, rate: 200.0 }),
         reference: None,
+        ..Vehicle::paper_car()
     }
 }
 

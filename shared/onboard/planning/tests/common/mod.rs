@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // each test file uses a part
 
-use kerbside_geometry::{Actuators, Drive, Footprint, Limits, Pose, Vehicle, math};
+use kerbside_geometry::{Footprint, Limits, Pose, Vehicle, math};
 use kerbside_messages::{PlanRequest, TrajectoryPoint};
 use kerbside_planning::{PlanFailure, Planned, PlannerSettings, Segment, plan};
 
@@ -79,32 +79,7 @@ impl Scene {
 }
 
 pub(crate) fn small_car() -> Vehicle {
-    Vehicle {
-        name: "1:6".into(),
-        wheelbase: 0.5,
-        track_front: 0.31,
-        track_rear: 0.31,
-        radius: [0.0725; 4],
-        drive: Drive::Rear,
-        footprint: Footprint { length: 0.75, width: 0.37, rear_overhang: 0.13 },
-        limits: Limits {
-            speed: 0.5,
-            acceleration: 0.3,
-            deceleration: 0.3,
-            steering: 30_f64.to_radians(),
-            steering_rate: 0.8,
-        },
-        actuators: Some(Actuators {
-            speed_delay: 0.02,
-            speed_lag: 0.10,
-            steering_delay: 0.02,
-            steering_lag: 0.05,
-        }),
-        encoders: None,
-        steering_sensor: None,
-        gyro: None,
-        reference: None,
-    }
+    Vehicle::paper_car()
 }
 
 /// A full-size car of that wheelbase, length, width and rear overhang.

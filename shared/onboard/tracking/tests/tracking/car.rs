@@ -2,38 +2,13 @@
 
 use std::collections::VecDeque;
 
-use kerbside_geometry::{Actuators, Drive, Footprint, Limits, Pose, Vehicle, math};
+use kerbside_geometry::{Drive, Pose, Vehicle, math};
 
 const STEP: f64 = 0.001;
 
 /// The 1:6 car.
 pub(crate) fn vehicle() -> Vehicle {
-    Vehicle {
-        name: "test".to_owned(),
-        wheelbase: 0.5,
-        track_front: 0.31,
-        track_rear: 0.31,
-        radius: [0.0725; 4],
-        drive: Drive::Rear,
-        footprint: Footprint { length: 0.75, width: 0.37, rear_overhang: 0.13 },
-        limits: Limits {
-            speed: 0.5,
-            acceleration: 0.3,
-            deceleration: 0.3,
-            steering: core::f64::consts::FRAC_PI_6,
-            steering_rate: 0.8,
-        },
-        actuators: Some(Actuators {
-            speed_delay: 0.02,
-            speed_lag: 0.1,
-            steering_delay: 0.02,
-            steering_lag: 0.05,
-        }),
-        encoders: None,
-        steering_sensor: None,
-        gyro: None,
-        reference: None,
-    }
+    Vehicle::paper_car()
 }
 
 #[derive(Clone, Debug)]
