@@ -40,7 +40,8 @@ pub fn parking(
     Ok(parking)
 }
 
-fn warn(warnings: &[Problem]) {
+/// Says what is suspicious but not refused.
+pub fn warn(warnings: &[Problem]) {
     for warning in warnings {
         tracing::warn!("{warning}");
     }

@@ -29,7 +29,7 @@ pub fn run(service: &Service) -> Result<Exit, Failure> {
         listener.wait(WAIT);
         restore.update();
         while let Some(sample) = travel.receive() {
-            life.begin(sample.header.origin);
+            life.begin(life.arrival(sample.header.origin, &sample.header));
             let fix = fixes.receive();
             let sent = odometry.send(|out| {
                 let inputs = EstimatorInputs {

@@ -1,5 +1,6 @@
 //! How a verb ends: exit codes, and failures that a person can act on.
 
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Exit codes; the same for every verb.
@@ -50,6 +51,27 @@ impl Failure {
         help: impl core::fmt::Display,
     ) -> Self {
         Self { exit, report: miette::miette!(help = help.to_string(), "{message}") }
+    }
+
+    /// Tells the person on standard error, and, where `json`, who reads standard output; the exit code.
+    #[must_use]
+    pub fn tell(&self, json: bool) -> Exit {
+        let report = &self.report;
+        if json {
+            let problems: Vec<_> =
+                report.related().into_iter().flatten().map(ToString::to_string).collect();
+            println!(
+                "{}",
+                serde_json::json!({
+                    "schema": "kerbside.failure.v1", "version": env!("CARGO_PKG_VERSION"), "seed": null,
+                    "passed": false, "figures": [], "exit": self.exit as u8, "error": report.to_string(),
+                    "help": report.help().map(|help| help.to_string()), "problems": problems,
+                })
+            );
+        }
+        // Nobody may read it any more; the exit code tells too.
+        let _ = writeln!(std::io::stderr(), "{report:?}");
+        self.exit
     }
 
     /// A failure of kerbside or of the machine.

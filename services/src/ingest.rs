@@ -28,7 +28,7 @@ pub fn run(service: &Service) -> Result<Exit, Failure> {
     while life.goes_on() {
         listener.wait(WAIT);
         while let Some(sample) = raw.receive() {
-            life.begin(sample.arrival);
+            life.begin(life.arrival(sample.arrival, &sample.header));
             let sent = travel.send(|out| {
                 stage.step(&sample, sample.missing, sample.new_epoch, out);
                 true

@@ -1,6 +1,8 @@
 //! kerbside: parks a car-like vehicle from its own wheel encoders, as real-time processes on shared memory.
 
 pub mod actuation;
+pub mod bench;
+pub mod children;
 pub mod commands;
 pub mod configuration;
 pub mod estimator;
@@ -19,9 +21,10 @@ pub mod park;
 pub mod planner;
 pub mod realtime;
 pub mod recorder;
+pub mod replay;
 pub mod service;
 pub mod supervisor;
 pub mod tracker;
 pub mod vehicle;
 
-pub use commands::{Cli, run};
+pub use commands::{Cli, asks_for_json, run};

@@ -2,16 +2,13 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-use kerbside::exit::{Exit, Failure};
+use clap::{CommandFactory, FromArgMatches};
+use kerbside::Cli;
 
 fn main() -> ExitCode {
     // Clap ends the process by itself: with code 2 on a wrong command line, 0 after --help.
-    let cli = kerbside::Cli::parse();
-    kerbside::run(&cli).unwrap_or_else(|failure| tell(&failure)).into()
-}
-
-fn tell(failure: &Failure) -> Exit {
-    eprintln!("{:?}", failure.report);
-    failure.exit
+    let matches = Cli::command().get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let tell = |failure: kerbside::exit::Failure| failure.tell(kerbside::asks_for_json(&matches));
+    kerbside::run(&cli).unwrap_or_else(tell).into()
 }

@@ -20,6 +20,8 @@ const STATE_AGE: Duration = Duration::from_secs(1);
 const SETTLE: f64 = 0.5;
 /// Speed below which a vehicle stands \[m/s\].
 const REST: f64 = 1e-3;
+/// Longest wait for a faulted stack to be whole again, before the manoeuvre is judged.
+const RECOVERY: Duration = Duration::from_secs(5);
 /// Longest drive beyond the plan's own duration.
 const OVERTIME: Duration = Duration::from_secs(20);
 
@@ -105,11 +107,13 @@ enum Phase {
     /// An arm was asked for.
     Arming,
     /// A plan was asked for under this arm.
-    Planning { arm: u64, planner_restarts: u32 },
+    Planning { arm: u64, planner_restarts: u32, refused: bool },
     /// A plan stands; the vehicle drives it.
     Driving { arm: u64 },
     /// The plan is completed; the vehicle settles.
     Settling,
+    /// A fault ended the drive; what failed comes back.
+    Recovering,
 }
 
 /// The operator of one manoeuvre.
@@ -151,6 +155,7 @@ impl Manoeuvre {
             Phase::Planning { .. } => "planning",
             Phase::Driving { .. } => "driving",
             Phase::Settling => "settling",
+            Phase::Recovering => "recovering",
         }
     }
 
@@ -160,15 +165,19 @@ impl Manoeuvre {
             return Act::End(end);
         }
         let Some(state) = seen.state else { return self.overdue(now, "the stack does not start") };
+        if state.mode() == Mode::Faulted && state.cause == Cause::GaveUp.code() {
+            return Act::End(End::Stopped(Cause::GaveUp));
+        }
         match self.phase {
             Phase::Waiting => self.waiting(now, state, seen),
             Phase::Fixing { resets } => self.fixing(now, resets, seen),
             Phase::Arming => self.arming(now, state, seen),
-            Phase::Planning { arm, planner_restarts } => {
-                self.planning(now, state, arm, planner_restarts, seen)
+            Phase::Planning { arm, planner_restarts, refused } => {
+                self.planning(now, state, (arm, planner_restarts, refused), seen)
             }
             Phase::Driving { arm } => self.driving(now, state, arm),
             Phase::Settling => self.settling(now, seen),
+            Phase::Recovering => self.recovering(now, state, seen),
         }
     }
 
@@ -202,31 +211,39 @@ impl Manoeuvre {
 
     fn waiting(&mut self, now: Nanos, state: &State, seen: &Observation<'_>) -> Act {
         let Some(odometry) = seen.odometry else { return self.overdue(now, "no odometry comes") };
-        if state.cause == Cause::GaveUp.code() {
-            return Act::End(End::Stopped(Cause::GaveUp));
-        }
         match state.mode() {
-            Mode::Ready | Mode::Faulted if state.healthy == 1 || !self.fixed => {
-                if !self.fixed {
-                    if state.mode() != Mode::Ready || odometry.standstill == 0 {
-                        return self.overdue(now, "the stack does not become ready");
-                    }
-                    self.enter(now, Phase::Fixing { resets: odometry.resets });
-                    self.asked = Some(now);
-                    return Act::Fix;
-                }
-                if odometry.state != EstimatorState::Valid.code() {
-                    return Act::End(End::PoseLost);
-                }
-                if odometry.standstill == 0 {
-                    return self.overdue(now, "the vehicle does not come to rest");
-                }
-                self.enter(now, Phase::Arming);
-                self.asked = Some(now);
-                Act::Arm
-            }
+            // A fault before the first arm stopped nothing: what counts is that all is well again.
+            Mode::Ready | Mode::Faulted if state.healthy == 1 => self.whole(now, odometry),
             _ => self.overdue(now, "the stack does not become ready"),
         }
+    }
+
+    /// All processes are well: the pose is next, or the arm.
+    fn whole(&mut self, now: Nanos, odometry: &Odometry) -> Act {
+        if odometry.standstill == 0 {
+            return self.overdue(now, "the vehicle does not come to rest");
+        }
+        if !self.fixed {
+            self.enter(now, Phase::Fixing { resets: odometry.resets });
+            self.asked = Some(now);
+            return Act::Fix;
+        }
+        if odometry.state != EstimatorState::Valid.code() {
+            return self.without_pose(now, odometry);
+        }
+        self.enter(now, Phase::Arming);
+        self.asked = Some(now);
+        Act::Arm
+    }
+
+    /// A restarted estimator is about to take up the pose it had, unless that was lost for good.
+    fn without_pose(&mut self, now: Nanos, odometry: &Odometry) -> Act {
+        let since = *self.asked.get_or_insert(now);
+        let lost = odometry.state == EstimatorState::Lost.code();
+        if lost || now.saturating_sub(since) > span(ANSWER) {
+            return Act::End(End::PoseLost);
+        }
+        Act::Watch
     }
 
     fn fixing(&mut self, now: Nanos, resets: u32, seen: &Observation<'_>) -> Act {
@@ -251,9 +268,10 @@ impl Manoeuvre {
             && answer.accepted == 1
         {
             let planner_restarts = restarts_of(state, Process::Planner);
-            self.enter(now, Phase::Planning { arm: answer.arms, planner_restarts });
+            let arm = answer.arms;
+            self.enter(now, Phase::Planning { arm, planner_restarts, refused: false });
             self.asked = Some(now);
-            return Act::Plan { arm: answer.arms };
+            return Act::Plan { arm };
         }
         if self.answer_is_late(now) {
             let lost = |odometry: &Odometry| odometry.state != EstimatorState::Valid.code();
@@ -270,8 +288,7 @@ impl Manoeuvre {
         &mut self,
         now: Nanos,
         state: &State,
-        arm: u64,
-        planner_restarts: u32,
+        (arm, planner_restarts, mut refused): (u64, u32, bool),
         seen: &Observation<'_>,
     ) -> Act {
         if let Some(act) = self.halted(now, state, arm) {
@@ -286,17 +303,18 @@ impl Manoeuvre {
                     return Act::Watch;
                 }
                 // The vehicle may still roll out, or a predecessor's request be under way: ask again.
-                PlanVerdict::Moving | PlanVerdict::Busy | PlanVerdict::NoPose => {}
+                PlanVerdict::Moving | PlanVerdict::Busy | PlanVerdict::NoPose => refused = true,
                 other => return Act::End(End::NoPlan(other)),
             }
         }
         let restarts = restarts_of(state, Process::Planner);
         let restarted = restarts != planner_restarts && row_is_healthy(state, Process::Planner);
-        if restarted || (seen.planned.is_some() && self.answer_is_late(now)) {
-            self.phase = Phase::Planning { arm, planner_restarts: restarts };
+        if restarted || (refused && self.answer_is_late(now)) {
+            self.phase = Phase::Planning { arm, planner_restarts: restarts, refused: false };
             self.asked = Some(now);
             return Act::Plan { arm };
         }
+        self.phase = Phase::Planning { arm, planner_restarts, refused };
         self.overdue(now, "no plan comes")
     }
 
@@ -334,11 +352,21 @@ impl Manoeuvre {
         if cause == Cause::PoseLost {
             return Some(Act::End(End::PoseLost));
         }
-        if !self.rearm || matches!(cause, Cause::GaveUp | Cause::Operator) {
+        if cause == Cause::Operator {
             return Some(Act::End(End::Stopped(cause)));
         }
-        self.enter(now, Phase::Waiting);
+        let goes_on = self.rearm;
+        self.enter(now, if goes_on { Phase::Waiting } else { Phase::Recovering });
         Some(Act::Watch)
+    }
+
+    /// The verdict is given once what failed is back: it names the cause, and what became of it.
+    fn recovering(&mut self, now: Nanos, state: &State, seen: &Observation<'_>) -> Act {
+        let cause = Cause::from_code(state.cause).unwrap_or(Cause::None);
+        let valid = |odometry: &Odometry| odometry.state == EstimatorState::Valid.code();
+        let whole = state.healthy == 1 && seen.odometry.is_some_and(valid);
+        let over = now.saturating_sub(self.since) > span(RECOVERY);
+        if whole || over || state.mode() == Mode::Ready { Act::End(End::Stopped(cause)) } else { Act::Watch }
     }
 
     fn answer_is_late(&self, now: Nanos) -> bool {
@@ -380,10 +408,26 @@ fn row_is_healthy(state: &State, process: Process) -> bool {
     state.rows().iter().any(|row| row.process == process as u8 && row.state == healthy)
 }
 
-/// The cause of the state in words, with the process it names.
+/// What an operator asked for when it led to this mode.
+fn asked_for(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Armed | Mode::Driving => "armed",
+        Mode::Down => "ended",
+        _ => "stopped",
+    }
+}
+
+/// The cause of the state in words, with the process it names; empty where there is none.
 #[must_use]
 pub fn cause_of(state: &State) -> String {
     let words = text::as_str(&state.text);
-    let cause = Cause::from_code(state.cause).map_or("unknown", Cause::name);
-    if words.is_empty() { cause.to_owned() } else { format!("{cause}: {words}") }
+    match Cause::from_code(state.cause) {
+        Some(Cause::None) => String::new(),
+        Some(Cause::Operator) => format!("{} by an operator", asked_for(state.mode())),
+        // The words often name the cause themselves.
+        Some(cause) if words.contains(cause.name()) => words.to_owned(),
+        Some(cause) if words.is_empty() => cause.name().to_owned(),
+        Some(cause) => format!("{cause}: {words}"),
+        None => "unknown".to_owned(),
+    }
 }

@@ -22,11 +22,29 @@ pub fn state_folder() -> PathBuf {
 /// # Errors
 /// [`Failure`] where it cannot be made.
 pub fn folder(out: Option<&Path>, verb: &str) -> Result<PathBuf, Failure> {
+    let folder = place(out, verb)?;
+    make(&folder).map(|()| folder)
+}
+
+/// Where [`folder`] makes it; nothing is made yet.
+///
+/// # Errors
+/// [`Failure`] where the path is none.
+pub fn place(out: Option<&Path>, verb: &str) -> Result<PathBuf, Failure> {
     let folder =
         out.map_or_else(|| state_folder().join(format!("{verb}-{}", stamp())), Path::to_path_buf);
-    fs::create_dir_all(&folder).map_err(|error| cannot_write(&folder, &error))?;
-    // Children run elsewhere and error messages are read elsewhere: name files in full.
-    fs::canonicalize(&folder).map_err(|error| cannot_write(&folder, &error))
+    // Error messages and reports are read elsewhere: name files in full.
+    std::path::absolute(&folder).map_err(|error| cannot_write(&folder, &error))
+}
+
+/// Makes a folder for results, with those above it, and makes sure that it can be written to.
+///
+/// # Errors
+/// [`Failure`] where it cannot.
+pub fn make(folder: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+    rustix::fs::access(folder, rustix::fs::Access::WRITE_OK)
+        .map_err(|error| cannot_write(folder, &error.into()))
 }
 
 /// Writes a file of results.
@@ -38,7 +56,14 @@ pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
 }
 
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::new(Exit::Unavailable, format!("{}: {error}", path.display()))
+    Failure::new(Exit::Unavailable, format!("cannot write to {}: {error}", path.display()))
+}
+
+/// Columns of the terminal on standard output; none where it is a pipe or a file.
+#[must_use]
+pub fn terminal_width() -> Option<u16> {
+    let size = rustix::termios::tcgetwinsize(std::io::stdout()).ok()?;
+    Some(size.ws_col).filter(|columns| *columns > 0)
 }
 
 /// The present moment for names of files: seconds of the epoch and the pid, so that two runs never share one.

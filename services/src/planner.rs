@@ -15,6 +15,7 @@ use kerbside_runtime::{Asked, Newest, PlanPublisher, Server, Session, SessionErr
 
 use crate::exit::{Exit, Failure};
 use crate::life::{self, Service, Worker};
+use crate::lockstep::words_of;
 
 /// Longest wait for a request.
 const WAIT: Duration = Duration::from_millis(100);
@@ -78,8 +79,8 @@ impl Planner {
             answered.answer.verdict = PlanVerdict::TooLong.code();
             answered.answer.text = text::from_str(&error.to_string());
         }
-        let verdict = PlanVerdict::from_code(answered.answer.verdict);
-        tracing::info!(id = request.id, ?verdict, seconds = answered.search_seconds, "planned");
+        let verdict = words_of(&answered.answer);
+        tracing::info!(id = request.id, verdict, seconds = answered.search_seconds, "planned");
         if let Err(error) = asked.answer(answered.answer) {
             tracing::warn!(%error, "the client went away before its answer");
         }

@@ -1,17 +1,18 @@
 //! What a process is started with: its instance, its configuration, and how to hand both on to children.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use kerbside_geometry::Vehicle;
+use kerbside_geometry::{Pose, Vehicle};
 use kerbside_messages::Process;
-use kerbside_odometry::Sensors;
+use kerbside_odometry::{InitialPose, Sensors};
 use kerbside_runtime::Instance;
 use kerbside_safety::SafetySettings;
-use kerbside_settings::{InterfaceSettings, Stack, Start};
+use kerbside_settings::{InterfaceSettings, Problem, Stack, Start};
 
 use crate::configuration;
 use crate::exit::{Exit, Failure};
+use crate::replay::{self, sensing};
 
 /// Where a process finds its instance and its configuration.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -34,6 +35,9 @@ pub struct ServiceArgs {
     /// Feed this run folder or recording in place of a vehicle.
     #[arg(long, value_name = "PATH", hide = true)]
     pub input: Option<PathBuf>,
+    /// What the readings of the input carry, as whoever read them found out.
+    #[arg(long, value_name = "SENSORS", hide = true, value_parser = sensing::parse)]
+    pub sensors: Option<Sensors>,
     /// Speed of the replay against real time; as fast as it goes where not given.
     #[arg(long, value_name = "FACTOR", hide = true)]
     pub speed: Option<f64>,
@@ -43,6 +47,12 @@ pub struct ServiceArgs {
     /// The instance runs with real-time rights, and so with the shorter time-outs.
     #[arg(long, hide = true)]
     pub realtime: bool,
+    /// The line leads to the instance's simulated vehicle, whatever device the configuration names.
+    #[arg(long, hide = true)]
+    pub simulated: bool,
+    /// Level of the children's log, in place of the configured one.
+    #[arg(skip)]
+    pub log: Option<String>,
 }
 
 /// A process's instance and configuration, loaded and checked.
@@ -54,10 +64,14 @@ pub struct Service {
     pub instance: Instance,
     /// The configuration.
     pub stack: Stack,
+    /// The same as a file, each value with where it comes from: for recordings.
+    pub stack_text: String,
     /// The vehicle.
     pub vehicle: Vehicle,
     /// What the vehicle senses.
     pub sensors: Sensors,
+    /// What is suspicious in the configuration: said by whoever a person started, not by each process.
+    pub warnings: Vec<Problem>,
     /// What it was started with.
     pub args: ServiceArgs,
 }
@@ -73,17 +87,36 @@ impl Service {
         default_instance: &str,
     ) -> Result<Self, Failure> {
         let instance = Instance::named(args.instance.as_deref().unwrap_or(default_instance))?;
-        let (config, vehicle) = (args.config.as_deref(), args.vehicle.as_deref());
-        let mut stack = match &args.scenario {
-            Some(scenario) => configuration::parking(config, scenario, vehicle)?.stack.value,
-            None => configuration::stack(config, vehicle)?,
+        // A replay's vehicle is the input's: the stack is checked with its own.
+        let named = args.vehicle.as_deref().filter(|_| args.input.is_none());
+        let sources = configuration::sources(args.config.as_deref())?;
+        let loaded = match &args.scenario {
+            Some(scenario) => sources.parking(scenario, named)?.stack,
+            None => sources.stack_for(named)?,
+        };
+        let (stack_text, warnings) = (loaded.show(), loaded.warnings);
+        let mut stack = loaded.value;
+        let sensors = match &args.input {
+            Some(input) => take_input(&mut stack, args, input)?,
+            None => Sensors::of(&stack.vehicle),
         };
         let vehicle = stack.vehicle.clone();
-        let sensors = Sensors::of(&vehicle);
         if args.restarted {
             stack.estimator.initial_pose = None;
         }
-        Ok(Self { process, instance, stack, vehicle, sensors, args: args.clone() })
+        if let InterfaceSettings::Line { device, .. } = &mut stack.interface
+            && args.simulated
+        {
+            *device = None;
+        }
+        let args = args.clone();
+        Ok(Self { process, instance, stack, stack_text, vehicle, sensors, warnings, args })
+    }
+
+    /// Whether the instance is fed from recorded readings.
+    #[must_use]
+    pub fn replays(&self) -> bool {
+        self.stack.interface == InterfaceSettings::Replay
     }
 
     /// Whether the instance runs with real-time rights.
@@ -107,7 +140,7 @@ impl Service {
     /// The processes its supervisor answers for: a replay needs no plan and moves nothing.
     #[must_use]
     pub fn supervised(&self) -> Vec<Process> {
-        let replay = self.stack.interface == InterfaceSettings::Replay;
+        let replay = self.replays();
         let takes_part = |process: &Process| match process {
             Process::Interface | Process::Ingest | Process::Estimator => true,
             Process::Recorder => self.stack.recorder.enabled,
@@ -130,12 +163,31 @@ impl Service {
         add("--vehicle", self.args.vehicle.clone().map(Into::into));
         add("--recording", self.args.recording.clone().map(Into::into));
         add("--input", self.args.input.clone().map(Into::into));
+        add("--sensors", self.args.sensors.map(|sensors| sensing::format(&sensors).into()));
         add("--speed", self.args.speed.map(|speed| speed.to_string().into()));
+        add("--log", self.args.log.clone().map(Into::into));
         if self.args.realtime {
             arguments.push("--realtime".into());
         }
+        if self.args.simulated {
+            arguments.push("--simulated".into());
+        }
         arguments
     }
+}
+
+/// Has `stack` replay `input`: the vehicle is the input's, and its pose begins where the drive does. Returns what the
+/// vehicle senses.
+fn take_input(stack: &mut Stack, args: &ServiceArgs, input: &Path) -> Result<Sensors, Failure> {
+    let described = replay::describe(input, args.vehicle.as_deref(), args.sensors)?;
+    stack.vehicle = described.file.vehicle;
+    stack.uncertainty = described.file.uncertainty;
+    stack.vehicle_file = described.origin;
+    stack.vehicle_text = described.text;
+    stack.interface = InterfaceSettings::Replay;
+    stack.estimator.initial_pose =
+        Some(InitialPose { pose: Pose::default(), position_noise: 0.0, yaw_noise: 0.0 });
+    Ok(described.sensors)
 }
 
 /// Refuses a factor that is none.

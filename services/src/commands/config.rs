@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
-use kerbside_settings::{Severity, check, explain, explain_all, reference};
-use serde_json::json;
+use kerbside_settings::{
+    Declaration, Setting, Severity, check, declarations, explain, explain_all, reference,
+};
+use serde_json::{Value, json};
 
 use crate::configuration::{Refused, sources};
 use crate::exit::{Exit, Failure};
@@ -30,6 +32,9 @@ pub enum ConfigVerb {
         /// Show a scenario with the stack that suits it.
         #[arg(long, value_name = "NAME")]
         scenario: Option<String>,
+        /// Print one JSON object.
+        #[arg(long)]
+        json: bool,
     },
     /// Say what a key means, its unit, range and default.
     #[command(after_help = "Example: kerbside config explain tracker.gain_across")]
@@ -43,6 +48,9 @@ pub enum ConfigVerb {
         /// Every key, as a Markdown page.
         #[arg(long, conflicts_with = "all")]
         reference: bool,
+        /// Print one JSON object.
+        #[arg(long, conflicts_with = "reference")]
+        json: bool,
     },
 }
 
@@ -53,32 +61,54 @@ pub enum ConfigVerb {
 pub fn run(verb: &ConfigVerb) -> Result<Exit, Failure> {
     match verb {
         ConfigVerb::Check { config, json } => check_all(config.as_deref(), *json),
-        ConfigVerb::Show { config, scenario } => show(config.as_deref(), scenario.as_deref()),
+        ConfigVerb::Show { config, scenario, json } => {
+            show(config.as_deref(), scenario.as_deref(), *json)
+        }
         ConfigVerb::Explain { reference: true, .. } => {
             print!("{}", reference());
             Ok(Exit::Good)
         }
-        ConfigVerb::Explain { key: Some(key), .. } => {
-            println!("{}", explain(key)?);
-            Ok(Exit::Good)
-        }
-        ConfigVerb::Explain { .. } => {
-            println!("{}", explain_all());
+        ConfigVerb::Explain { key, json, .. } => {
+            let text = key.as_deref().map_or_else(|| Ok(explain_all()), explain)?;
+            if *json {
+                println!("{}", object("config-keys", true, "keys", keys(key.as_deref())));
+            } else {
+                print!("{text}");
+            }
             Ok(Exit::Good)
         }
     }
+}
+
+fn object(schema: &str, passed: bool, name: &str, content: Value) -> Value {
+    json!({
+        "schema": format!("kerbside.{schema}.v1"), "version": env!("CARGO_PKG_VERSION"), "seed": null,
+        "passed": passed, "figures": [], name: content,
+    })
+}
+
+/// The declarations of a key, of a table's keys, or of all.
+fn keys(wanted: Option<&str>) -> Value {
+    let is_wanted = |path: &str| {
+        wanted.is_none_or(|wanted| {
+            path.strip_prefix(wanted).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        })
+    };
+    let one = |key: Declaration| {
+        json!({
+            "key": key.path, "file": key.file, "doc": key.doc, "allowed": key.kind.to_string(),
+            "default": key.default.map(|value| value.to_string()),
+        })
+    };
+    declarations().into_iter().filter(|key| is_wanted(&key.path)).map(one).collect()
 }
 
 fn check_all(config: Option<&std::path::Path>, as_json: bool) -> Result<Exit, Failure> {
     let problems = check(&sources(config)?);
     let refused = problems.iter().any(|problem| problem.severity == Severity::Error);
     if as_json {
-        let list: Vec<_> = problems.iter().map(ToString::to_string).collect();
-        let object = json!({
-            "schema": "kerbside.config.v1", "version": env!("CARGO_PKG_VERSION"), "seed": null, "passed": !refused,
-            "figures": [], "problems": list,
-        });
-        println!("{object}");
+        let list = problems.iter().map(ToString::to_string).collect();
+        println!("{}", object("config", !refused, "problems", list));
     } else if problems.is_empty() {
         println!("no problem found");
     } else {
@@ -87,14 +117,36 @@ fn check_all(config: Option<&std::path::Path>, as_json: bool) -> Result<Exit, Fa
     Ok(if refused { Exit::Configuration } else { Exit::Good })
 }
 
-fn show(config: Option<&std::path::Path>, scenario: Option<&str>) -> Result<Exit, Failure> {
+fn show(
+    config: Option<&std::path::Path>,
+    scenario: Option<&str>,
+    as_json: bool,
+) -> Result<Exit, Failure> {
     let sources = sources(config)?;
-    match scenario {
-        Some(scenario) => {
-            let parking = sources.parking(scenario, None)?;
-            println!("{}\n{}", parking.scenario.show(), parking.stack.show());
-        }
-        None => println!("{}", sources.stack()?.show()),
+    let (mut texts, mut settings) = (Vec::new(), Vec::new());
+    let mut add = |text: String, list: &[Setting]| {
+        texts.push(text);
+        settings.extend(list.iter().map(setting));
+    };
+    if let Some(scenario) = scenario {
+        let parking = sources.parking(scenario, None)?;
+        add(parking.scenario.show(), &parking.scenario.settings);
+        add(parking.stack.show(), &parking.stack.settings);
+    } else {
+        let stack = sources.stack()?;
+        add(stack.show(), &stack.settings);
+    }
+    if as_json {
+        println!("{}", object("config-values", true, "settings", settings.into()));
+    } else {
+        print!("{}", texts.join("\n"));
     }
     Ok(Exit::Good)
+}
+
+fn setting(setting: &Setting) -> Value {
+    json!({
+        "key": setting.key, "value": setting.value.to_string(), "from": setting.origin.to_string(),
+        "note": setting.note,
+    })
 }

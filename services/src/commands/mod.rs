@@ -1,6 +1,8 @@
 //! The command line: a file per verb.
 
 mod config;
+mod fix;
+mod go;
 mod operator;
 mod recording;
 mod status;
@@ -13,6 +15,7 @@ use kerbside_messages::Process;
 
 use crate::exit::{Exit, Failure};
 use crate::park::ParkArgs;
+use crate::replay::ReplayArgs;
 use crate::service::{Service, ServiceArgs};
 use crate::vehicle::VehicleArgs;
 use crate::{
@@ -31,8 +34,8 @@ pub const DEFAULT_INSTANCE: &str = "kerbside";
     after_help = "Example: kerbside park garage"
 )]
 pub struct Cli {
-    /// Level of the log on standard error: error, warn, info, debug or trace; RUST_LOG goes before it.
-    #[arg(long, global = true, value_name = "LEVEL")]
+    /// Least severity that is logged on standard error; RUST_LOG goes before it.
+    #[arg(long, global = true, value_name = "LEVEL", value_parser = log_levels())]
     log: Option<String>,
     #[command(subcommand)]
     verb: Verb,
@@ -57,19 +60,25 @@ enum Verb {
     Down(operator::OperatorArgs),
     /// Tell the estimator where the standing vehicle is.
     #[command(after_help = "Example: kerbside fix -- -1.0 0.65 0")]
-    Fix(operator::FixArgs),
-    /// Arm, and drive to the goal of a scenario.
-    #[command(after_help = "Example: kerbside go garage")]
-    Go(operator::GoArgs),
+    Fix(fix::FixArgs),
+    /// Arm, drive to a goal, and say when the vehicle is there; Ctrl-C stops it.
+    #[command(after_help = go::EXAMPLES)]
+    Go(go::GoArgs),
     /// Show each process and the mode, live from shared memory.
     #[command(after_help = "Example: kerbside status --json")]
     Status(status::StatusArgs),
+    /// Feed recorded readings through ingest and estimator, and say how far the odometry drifts.
+    #[command(after_help = "Example: kerbside replay tests/data/cases/paper-1-6 --speed 10")]
+    Replay(ReplayArgs),
     /// Check, show or explain the configuration.
-    #[command(subcommand)]
+    #[command(subcommand, after_help = "Example: kerbside config check")]
     Config(config::ConfigVerb),
     /// Check or recover a recording.
-    #[command(subcommand)]
+    #[command(subcommand, after_help = "Example: kerbside recording check recording.mcap")]
     Recording(recording::RecordingVerb),
+    /// Measure hops, the pipeline and the start, and hold them against limits.
+    #[command(subcommand)]
+    Bench(crate::bench::BenchVerb),
     /// Run one process of a stack; the supervisor starts them by itself.
     #[command(subcommand, after_help = "Example: kerbside service tracker --instance bay2")]
     Service(ServiceVerb),
@@ -78,20 +87,28 @@ enum Verb {
 #[derive(Debug, Subcommand)]
 enum ServiceVerb {
     /// The line to the vehicle.
+    #[command(after_help = "Example: kerbside service interface --instance bay2")]
     Interface(ServiceArgs),
     /// Counts to travel.
+    #[command(after_help = "Example: kerbside service ingest --instance bay2")]
     Ingest(ServiceArgs),
     /// Travel to pose.
+    #[command(after_help = "Example: kerbside service estimator --instance bay2")]
     Estimator(ServiceArgs),
     /// Requests to plans.
+    #[command(after_help = "Example: kerbside service planner --instance bay2")]
     Planner(ServiceArgs),
     /// Pose and plan to command.
+    #[command(after_help = "Example: kerbside service tracker --instance bay2")]
     Tracker(ServiceArgs),
     /// The gate before the vehicle.
+    #[command(after_help = "Example: kerbside service actuation --instance bay2")]
     Actuation(ServiceArgs),
     /// Samples to disk.
+    #[command(after_help = "Example: kerbside service recorder --instance bay2")]
     Recorder(ServiceArgs),
     /// The simulated vehicle, outside the supervised set.
+    #[command(after_help = "Example: kerbside service vehicle --instance bay2 --start=-1,0.65,0")]
     Vehicle(VehicleArgs),
 }
 
@@ -101,13 +118,26 @@ enum ServiceVerb {
 /// [`Failure`] with its exit code.
 pub fn run(cli: &Cli) -> Result<Exit, Failure> {
     let level = cli.log.as_deref();
+    // A file that may not grow is an error to report, no reason to die.
+    let ignored = std::sync::Arc::default();
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored).map_err(Failure::internal)?;
     match &cli.verb {
         Verb::Park(args) => {
-            logging::start("park", level.unwrap_or("warn"), false);
-            park::run(args)
+            let level = level.unwrap_or("warn");
+            logging::start("park", level, false);
+            park::run(&ParkArgs { log: Some(level.to_owned()), ..args.clone() })
+        }
+        Verb::Replay(args) => {
+            let level = level.unwrap_or("warn");
+            logging::start("replay", level, false);
+            crate::replay::run(&ReplayArgs { log: Some(level.to_owned()), ..args.clone() })
         }
         Verb::Up(args) => up::run(args, level),
         Verb::Service(verb) => serve(verb, level),
+        Verb::Bench(verb) => {
+            logging::start("bench", level.unwrap_or("warn"), false);
+            crate::bench::run(verb)
+        }
         Verb::Arm(_)
         | Verb::Stop(_)
         | Verb::Down(_)
@@ -115,14 +145,17 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
         | Verb::Go(_)
         | Verb::Status(_) => {
             logging::start("operator", level.unwrap_or("warn"), false);
+            kerbside_runtime::end_on_broken_pipe();
             operate(&cli.verb)
         }
         Verb::Config(verb) => {
             logging::start("config", level.unwrap_or("warn"), false);
+            kerbside_runtime::end_on_broken_pipe();
             config::run(verb)
         }
         Verb::Recording(verb) => {
             logging::start("recording", level.unwrap_or("warn"), false);
+            kerbside_runtime::end_on_broken_pipe();
             recording::run(verb)
         }
     }
@@ -134,8 +167,8 @@ fn operate(verb: &Verb) -> Result<Exit, Failure> {
         Verb::Arm(args) => operator::ask(args, Ask::Arm),
         Verb::Stop(args) => operator::ask(args, Ask::Stop),
         Verb::Down(args) => operator::ask(args, Ask::Down),
-        Verb::Fix(args) => operator::fix(args),
-        Verb::Go(args) => operator::go(args),
+        Verb::Fix(args) => fix::run(args),
+        Verb::Go(args) => go::run(args),
         Verb::Status(args) => status::run(args),
         _ => Err(Failure::internal("not an operator's verb")),
     }
@@ -165,6 +198,19 @@ fn start_log(service: &Service, level: Option<&str>) {
     let log = &service.stack.log;
     let json = log.format == kerbside_settings::LogFormat::Json;
     logging::start(service.process.name(), level.unwrap_or(log.level.name()), json);
+}
+
+/// Whether the verb was given --json; for verbs that know it.
+#[must_use]
+pub fn asks_for_json(matches: &clap::ArgMatches) -> bool {
+    match matches.subcommand() {
+        Some((_, matches)) => asks_for_json(matches),
+        None => matches.try_get_one("json").is_ok_and(|given| given == Some(&true)),
+    }
+}
+
+fn log_levels() -> clap::builder::PossibleValuesParser {
+    kerbside_settings::LogLevel::NAMES.iter().copied().into()
 }
 
 /// Where results go, for verbs that write files.

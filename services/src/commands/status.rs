@@ -2,8 +2,8 @@
 
 use core::time::Duration;
 
-use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{ContentArrangement, Table};
 use kerbside_messages::{Mode, Process, ProcessRow, ProcessState, State, text};
 use kerbside_runtime::{Instance, Newest, Session, Ticker, now};
 use serde_json::json;
@@ -114,15 +114,16 @@ fn print_json(instance: &Instance, state: &State) {
 }
 
 fn print_table(instance: &Instance, state: &State) {
-    println!(
-        "instance {}: {}, {}; supervisor is process {}",
-        instance.name(),
-        state.mode(),
-        cause_of(state),
-        state.pid
-    );
+    println!("instance {}, supervised by process {}", instance.name(), state.pid);
+    match cause_of(state).as_str() {
+        "" => println!("mode {}", state.mode()),
+        cause => println!("mode {}: {cause}", state.mode()),
+    }
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED);
+    if let Some(width) = crate::output::terminal_width() {
+        table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
+    }
     table.set_header(["process", "pid", "state", "restarts", "misses", "age ms", "says"]);
     for row in state.rows() {
         table.add_row([

@@ -1,27 +1,37 @@
 //! `up`: the supervisor in the foreground.
 
+use core::time::Duration;
+use std::io::Write;
 use std::os::unix::process::CommandExt;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
+use kerbside_geometry::Pose;
 use kerbside_messages::Process;
-use kerbside_runtime::FileLock;
+use kerbside_runtime::{FileLock, Ticker, now};
 
 use super::DEFAULT_INSTANCE;
 use crate::exit::{Exit, Failure};
 use crate::service::{Service, ServiceArgs};
+use crate::vehicle::{format_pose, parse_pose};
 use crate::{parent, realtime, supervisor};
+
+/// Longest wait for the vehicle's orderly end.
+const VEHICLE_END: Duration = Duration::from_secs(2);
+/// Time between looks whether it ended.
+const LOOK: Duration = Duration::from_millis(5);
 
 /// What `up` is asked.
 #[derive(Clone, Debug, clap::Args)]
 pub struct UpArgs {
     #[command(flatten)]
     service: ServiceArgs,
-    /// Start a simulated vehicle too, unless the instance has one.
+    /// Drive a simulated vehicle: the one that the instance still has, else a new one. It ends with the stack, but
+    /// survives a supervisor that is killed, as a real vehicle does.
     #[arg(long)]
     simulate: bool,
     /// Where the simulated vehicle stands at first: x and y in metres, yaw in degrees.
-    #[arg(long, value_name = "X,Y,YAW", default_value = "0,0,0", allow_hyphen_values = true)]
-    start: String,
+    #[arg(long, value_name = "X,Y,YAW", default_value = "0,0,0", allow_hyphen_values = true, value_parser = parse_pose)]
+    start: Pose,
     /// Seed of the simulated vehicle's noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -40,45 +50,77 @@ pub fn run(args: &UpArgs, level: Option<&str>) -> Result<Exit, Failure> {
     if let Some(parent) = args.with_parent {
         parent::die_with_parent(parent);
     } else {
-        // Whoever starts this one has decided already.
+        // Whoever starts this one has decided, and said, already.
+        crate::configuration::warn(&service.warnings);
         service.args.realtime = realtime::wanted(&service.stack)?;
     }
-    crate::vehicle::parse_pose(&args.start)
-        .map_err(|error| Failure::new(Exit::Usage, format!("--start: {error}")))?;
-    let vehicle = args.simulate.then(|| start_vehicle(args, &service)).transpose()?.flatten();
+    service.args.simulated |= args.simulate;
+    service.args.log = level.map(str::to_owned);
+    if args.simulate {
+        start_vehicle(args, &service)?;
+    }
     let name = service.instance.name().to_owned();
-    let exit = supervisor::run(&service, || eprintln!("instance {name} is ready; Ctrl-C ends it"));
-    if let Some(mut vehicle) = vehicle {
-        kerbside_runtime::terminate(vehicle.id());
-        let _ = vehicle.wait();
-        service.instance.remove()?;
+    let exit = supervisor::run(&service, || {
+        if args.with_parent.is_none() {
+            // Nobody may read any more what this says; that is no reason to end.
+            let _ = writeln!(std::io::stderr(), "instance {name} is ready; Ctrl-C ends it");
+        }
+    });
+    if args.simulate {
+        end_vehicle(&service)?;
     }
     exit
 }
 
 /// A vehicle that outlived an earlier supervisor is used as it is.
-fn start_vehicle(args: &UpArgs, service: &Service) -> Result<Option<Child>, Failure> {
-    if let Some(pid) = FileLock::holder(&service.instance.process_lock(Process::Vehicle)) {
-        tracing::info!(pid, "the instance has a simulated vehicle");
-        return Ok(None);
-    }
+fn start_vehicle(args: &UpArgs, service: &Service) -> Result<(), Failure> {
     if let Some(pid) = service.instance.supervisor() {
         let name = service.instance.name();
         return Err(Failure::unavailable(format!(
             "instance {name} is already supervised by process {pid}"
         )));
     }
+    if let Some(pid) = vehicle_of(service) {
+        tracing::info!(pid, "the instance has a simulated vehicle");
+        return Ok(());
+    }
     kerbside_runtime::close_inherited_on_exec();
-    let child = Command::new("/proc/self/exe")
+    Command::new("/proc/self/exe")
         .arg0("kerbside")
         .args(["service", "vehicle"])
         .args(service.arguments())
-        .args(["--start", &args.start, "--seed", &args.seed.to_string()])
-        .args(["--with-parent", &std::process::id().to_string()])
+        .args(["--start", &format_pose(&args.start), "--seed", &args.seed.to_string()])
+        .arg("--with-stack")
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .process_group(0)
         .spawn()
         .map_err(Failure::internal)?;
-    Ok(Some(child))
+    Ok(())
+}
+
+fn vehicle_of(service: &Service) -> Option<u32> {
+    FileLock::holder(&service.instance.process_lock(Process::Vehicle))
+}
+
+/// Ends the vehicle, whoever started it; one that was stopped is woken for it, or killed.
+fn end_vehicle(service: &Service) -> Result<(), Failure> {
+    if service.instance.supervisor().is_some() {
+        // Another one was faster: vehicle and instance are its own.
+        return Ok(());
+    }
+    let deadline = now() + crate::life::nanos(VEHICLE_END);
+    let mut look = Ticker::new(LOOK);
+    if let Some(pid) = vehicle_of(service) {
+        kerbside_runtime::terminate(pid);
+        kerbside_runtime::resume(pid);
+    }
+    while let Some(pid) = vehicle_of(service) {
+        if now() > deadline {
+            kerbside_runtime::kill(pid);
+        }
+        look.wait();
+    }
+    service.instance.remove()?;
+    Ok(())
 }

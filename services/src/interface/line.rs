@@ -186,15 +186,16 @@ pub fn run(service: &Service) -> Result<Exit, Failure> {
     let mut buffer = [0; 4096];
     while life.goes_on() {
         door.open(now());
-        wait(&door, &listener);
-        listener.drain();
+        let woken = wait(&door, &listener);
         let arrival = now();
         life.begin(arrival);
-        if let Some(bytes) = door.read(&mut stage, &mut buffer) {
+        if woken.by_line
+            && let Some(bytes) = door.read(&mut stage, &mut buffer)
+        {
             hear(&mut stage, arrival, bytes, &mut raw);
         }
         life.checkpoint(0);
-        actuator.update();
+        take_in(&mut actuator, &listener, woken);
         door.send(&mut stage, actuator.get(), freshness);
         life.checkpoint(1);
         life.end();
@@ -226,17 +227,52 @@ fn device_of(service: &Service) -> (PathBuf, u32) {
     }
 }
 
-fn wait(door: &Door, listener: &kerbside_runtime::Listener) {
+/// What woke the interface; each thing costs system calls to look after, so only what is there is looked after.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Woken {
+    by_line: bool,
+    by_samples: bool,
+}
+
+fn wait(door: &Door, listener: &kerbside_runtime::Listener) -> Woken {
     let deadline = now() + WAIT;
-    match &door.line {
-        Some(line) => poll_readable(&[line.as_fd(), listener.as_fd()], deadline),
+    let ready = match &door.line {
+        // The samples' bit stays the same with and without a line.
+        Some(line) => poll_readable(&[listener.as_fd(), line.as_fd()], deadline),
         None => poll_readable(&[listener.as_fd()], deadline),
     };
+    // After a wait in vain both are looked after: a wake-up may have got lost.
+    Woken { by_samples: ready & 1 != 0 || ready == 0, by_line: ready & 2 != 0 || ready == 0 }
+}
+
+/// Takes in the newest actuator sample. Notifications are forgotten first, so that no sample is slept over; and where
+/// a sample came without one, its wake-up got lost or is about to come.
+fn take_in(
+    actuator: &mut Newest<Actuator>,
+    listener: &kerbside_runtime::Listener,
+    woken: Woken,
+) {
+    if woken.by_samples {
+        listener.drain();
+    }
+    if actuator.update() && !woken.by_samples {
+        listener.drain();
+        actuator.update();
+    }
 }
 
 fn log_news(event: HostEvent) {
     match event {
-        HostEvent::Hello(hello) => tracing::info!(?hello, "vehicle described itself"),
+        HostEvent::Hello(hello) => tracing::info!(
+            boot = hello.boot,
+            counter_bits = hello.counter_bits,
+            counts_mask = hello.counts_mask,
+            steering = hello.has_steering,
+            yaw_rate = hello.has_yaw_rate,
+            period_us = hello.reading_period_us,
+            silence_ms = hello.silence_ms,
+            "vehicle described itself"
+        ),
         HostEvent::Started { boot } => tracing::info!(boot, "commands count from now on"),
         HostEvent::Restarted { boot } => {
             tracing::warn!(boot, "vehicle started anew: its counters are new")

@@ -1,6 +1,7 @@
 //! The vehicle interface: one file a kind of line.
 
 mod line;
+mod replay;
 pub mod serial;
 
 pub use line::{LineStage, reading_to_raw};
@@ -17,6 +18,6 @@ use crate::life::Service;
 pub fn run(service: &Service) -> Result<Exit, Failure> {
     match service.stack.interface {
         InterfaceSettings::Line { .. } => line::run(service),
-        InterfaceSettings::Replay => Err(Failure::internal("nothing to replay")),
+        InterfaceSettings::Replay => replay::run(service),
     }
 }

@@ -4,4 +4,5 @@
 mod channel;
 mod world;
 
+pub use channel::Channel;
 pub use world::{LineFault, Script, World, words_of};

@@ -1,18 +1,16 @@
 //! A run as processes: the supervisor and the simulated vehicle are started, watched, and ended in order.
 
 use core::time::Duration;
-use std::os::unix::process::CommandExt;
+use std::ffi::OsString;
 use std::path::PathBuf;
-use std::process::{Child, Command as ProcessCommand, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use kerbside_messages::{
     Actuator, Command, Fix, Heartbeat, Message, Odometry, OperatorAnswer, OperatorRequest,
-    PlanAnswer, PlanRequest, Process, State, Truth, Verb,
+    PlanAnswer, PlanRequest, State, Truth, Verb,
 };
 use kerbside_runtime::{
-    Client, Instance, Newest, Pending, PlanSubscriber, Publisher, Session, SessionError,
+    Client, Newest, Pending, PlanSubscriber, Publisher, Session, SessionError,
     Subscriber, Ticker, now,
 };
 
@@ -20,6 +18,7 @@ use super::progress::Progress;
 use super::scene::Start;
 use super::trace::Trace;
 use super::{Job, Run};
+use crate::children::Children;
 use crate::exit::Failure;
 use crate::life::stop_flag;
 use crate::manoeuvre::{Act, End, Manoeuvre, Observation};
@@ -27,10 +26,10 @@ use crate::vehicle::format_pose;
 
 /// The operator looks every so often.
 const LOOK: Duration = Duration::from_millis(20);
-/// Longest wait for the instance's services after the supervisor was started.
-const START: Duration = Duration::from_secs(10);
-/// Longest wait for the supervisor's orderly end.
-const END: Duration = Duration::from_secs(10);
+/// Longest wait for a vehicle without supervisor to stand.
+const STOP: Duration = Duration::from_secs(2);
+/// Speed below which it only rolls out \[m/s\].
+const REST: f64 = 1e-2;
 
 /// Runs `job` as processes.
 ///
@@ -40,13 +39,18 @@ pub fn run(job: &Job, progress: &Progress) -> Result<Run, Failure> {
     let begun = now();
     let stop = stop_flag()?;
     let start = Start::draw(&job.scenario, job.seed);
-    let mut stack = Children::start(job, &start)?;
-    let session = wait_for(&job.service.instance, &mut stack, &stop)?;
+    let pose = format_pose(&start.truth);
+    let vehicle = ["--start", &pose, "--seed", &job.seed.to_string()].map(OsString::from);
+    let mut stack = Children::start(&job.service, Some(&vehicle))?;
+    let session = stack.join(&stop)?;
     let mut desk = Desk::open(&session, job)?;
     let mut trace = Trace::new(now());
     let end = operate(job, &start, &mut stack, &mut desk, &mut trace, progress, &stop);
+    if end == End::SupervisorLost {
+        watch_stop(&mut desk, &mut trace);
+    }
     drop((desk, session));
-    stack.end();
+    stack.end(end == End::SupervisorLost);
     Ok(Run {
         trace,
         end,
@@ -98,127 +102,14 @@ fn operate(
     }
 }
 
-/// The supervisor and the simulated vehicle.
-struct Children {
-    supervisor: Child,
-    vehicle: Child,
-    instance: Instance,
-}
-
-impl Children {
-    fn start(job: &Job, start: &Start) -> Result<Self, Failure> {
-        job.service.instance.create_folder()?;
-        let arguments = job.service.arguments();
-        let parent = std::process::id().to_string();
-        let mut vehicle = own_executable();
-        vehicle.args(["service", "vehicle"]).args(&arguments);
-        vehicle.args(["--start", &format_pose(&start.truth), "--seed", &job.seed.to_string()]);
-        let mut supervisor = own_executable();
-        supervisor.arg("up").args(&arguments);
-        let vehicle = spawn(vehicle.args(["--with-parent", &parent]))?;
-        let supervisor = match spawn(supervisor.args(["--with-parent", &parent])) {
-            Ok(supervisor) => supervisor,
-            Err(failure) => {
-                kerbside_runtime::kill(vehicle.id());
-                return Err(failure);
-            }
-        };
-        Ok(Self { supervisor, vehicle, instance: job.service.instance.clone() })
-    }
-
-    fn vehicle_ended(&mut self) -> bool {
-        matches!(self.vehicle.try_wait(), Ok(Some(_)) | Err(_))
-    }
-
-    fn supervisor_ended(&mut self) -> bool {
-        matches!(self.supervisor.try_wait(), Ok(Some(_)) | Err(_))
-    }
-
-    /// Ends both: in order where the supervisor still listens, by force where it does not.
-    fn end(&mut self) {
-        kerbside_runtime::terminate(self.supervisor.id());
-        wait_or_kill(&mut self.supervisor);
-        end_orphans(&self.instance);
-        kerbside_runtime::terminate(self.vehicle.id());
-        wait_or_kill(&mut self.vehicle);
-        if let Err(error) = self.instance.remove() {
-            tracing::warn!(%error, "something of the instance is left");
-        }
-    }
-}
-
-impl Drop for Children {
-    fn drop(&mut self) {
-        if !(self.supervisor_ended() && self.vehicle_ended()) {
-            self.end();
-        }
-    }
-}
-
-/// Processes whose supervisor was killed end by themselves after two seconds; nobody waits for that here.
-fn end_orphans(instance: &Instance) {
-    for process in Process::SUPERVISED {
-        if let Some(pid) = kerbside_runtime::FileLock::holder(&instance.process_lock(process)) {
-            kerbside_runtime::kill(pid);
-        }
-    }
-}
-
-fn own_executable() -> ProcessCommand {
-    let mut command = ProcessCommand::new("/proc/self/exe");
-    command.arg0("kerbside");
-    command
-}
-
-fn spawn(command: &mut ProcessCommand) -> Result<Child, Failure> {
-    kerbside_runtime::close_inherited_on_exec();
-    command
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .process_group(0)
-        .spawn()
-        .map_err(Failure::internal)
-}
-
-fn wait_or_kill(child: &mut Child) {
-    let deadline = now() + crate::life::nanos(END);
+/// Without a supervisor the vehicle stops by itself: that belongs to the run.
+fn watch_stop(desk: &mut Desk, trace: &mut Trace) {
+    let deadline = now() + crate::life::nanos(STOP);
     let mut look = Ticker::new(LOOK);
-    while matches!(child.try_wait(), Ok(None)) {
-        if now() > deadline {
-            tracing::warn!(pid = child.id(), "does not end; killed");
-            kerbside_runtime::kill(child.id());
-        }
+    let moves = |trace: &Trace| trace.truth.last().is_some_and(|truth| truth.speed.abs() > REST);
+    while moves(trace) && now() < deadline {
         look.wait();
-    }
-}
-
-fn wait_for(
-    instance: &Instance,
-    stack: &mut Children,
-    stop: &Arc<AtomicBool>,
-) -> Result<Session, Failure> {
-    let deadline = now() + crate::life::nanos(START);
-    let mut look = Ticker::new(Duration::from_millis(5));
-    loop {
-        // The configuration is there before the services are: the last one that is created decides.
-        let joined = Session::join(instance, Process::Operator).and_then(|session| {
-            session.client::<OperatorRequest, OperatorAnswer>().map(|_| session)
-        });
-        match joined {
-            Ok(session) => return Ok(session),
-            Err(error) if !error.is_missing() => return Err(error.into()),
-            Err(error) if now() > deadline => return Err(Failure::unavailable(error)),
-            Err(_) => {}
-        }
-        if stack.supervisor_ended() {
-            return Err(Failure::unavailable(
-                "the supervisor ended at its start; its messages are above",
-            ));
-        }
-        if stop.load(Ordering::Relaxed) {
-            return Err(Failure::unavailable("interrupted"));
-        }
-        look.wait();
+        desk.take_in(trace);
     }
 }
 

@@ -50,7 +50,7 @@ pub struct ParkArgs {
     /// Name of the instance; a fresh one where not given.
     #[arg(long, value_name = "NAME")]
     pub instance: Option<String>,
-    /// Folder for report and recording; a new one in the state folder where not given.
+    /// Folder for report, picture and recording; a new one in the state folder where not given.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Show no live progress.
@@ -59,6 +59,9 @@ pub struct ParkArgs {
     /// Print one JSON object.
     #[arg(long)]
     pub json: bool,
+    /// Level of the processes' log.
+    #[arg(skip)]
+    pub log: Option<String>,
 }
 
 /// A manoeuvre to run.
@@ -118,8 +121,8 @@ pub struct Finished {
     pub run: Run,
     /// What came of it.
     pub verdict: Verdict,
-    /// The report.
-    pub report: PathBuf,
+    /// The report; none where it could not be written.
+    pub report: Option<PathBuf>,
 }
 
 /// Runs the verb.
@@ -127,14 +130,14 @@ pub struct Finished {
 /// # Errors
 /// [`Failure`] where the configuration is refused or the stack cannot run.
 pub fn run(args: &ParkArgs) -> Result<Exit, Failure> {
-    let folder = output::folder(args.out.as_deref(), "park")?;
+    let folder = output::place(args.out.as_deref(), "park")?;
     let mut finished = Vec::new();
     for index in 0..args.runs {
         let seed = args.seed + u64::from(index);
         let folder = if args.runs == 1 {
             folder.clone()
         } else {
-            output::folder(Some(&folder.join(seed.to_string())), "park")?
+            folder.join(seed.to_string())
         };
         let one = run_one(args, seed, &folder)?;
         let interrupted = one.run.end == End::Interrupted;
@@ -148,21 +151,26 @@ pub fn run(args: &ParkArgs) -> Result<Exit, Failure> {
 
 fn run_one(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Finished, Failure> {
     let job = job(args, seed, folder)?;
+    // Only now, so that what is refused leaves no folder behind.
+    output::make(folder)?;
     let run = if job.lockstep {
         simulated::run(&job, Script::default())?
     } else {
         let progress = Progress::new(args.headless);
-        if args.instance.is_none() {
-            tracing::info!(instance = job.service.instance.name(), "instance");
-        }
+        progress.say(&format!("instance {}", job.service.instance.name()));
         let run = live::run(&job, &progress);
         progress.clear();
         run?
     };
     let verdict = judge(&run.trace, &job.scenario, &job.service.vehicle, run.end);
+    let told = report::of(&job, &run, &verdict);
     let report = folder.join("report.html");
-    let page = report::of(&job, &run, &verdict).render().map_err(Failure::internal)?;
-    output::write(&report, &page)?;
+    let page = told.render().map_err(Failure::internal)?;
+    let written = output::write(&report, &page)
+        .and_then(|()| output::write(&folder.join("picture.svg"), &told.picture()));
+    // A full disk costs what would be on it; the car has parked all the same.
+    let failed = |failure: &Failure| tracing::error!("no report: {}", failure.report);
+    let report = written.inspect_err(failed).ok().map(|()| report);
     Ok(Finished { job, run, verdict, report })
 }
 
@@ -183,6 +191,8 @@ pub fn job(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Job, Failure> {
         vehicle: args.vehicle.clone(),
         recording: recording.clone(),
         realtime: crate::realtime::wanted(&parking.stack.value)?,
+        simulated: true,
+        log: args.log.clone(),
         ..ServiceArgs::default()
     };
     let service = Service::load(Process::Operator, &service_args, &name)?;

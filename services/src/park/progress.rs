@@ -36,6 +36,11 @@ impl Progress {
         self.bar.tick();
     }
 
+    /// Says something that stays, above the line.
+    pub fn say(&self, text: &str) {
+        self.bar.println(text);
+    }
+
     /// Takes the line away.
     pub fn clear(&self) {
         self.bar.finish_and_clear();

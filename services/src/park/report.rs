@@ -1,7 +1,7 @@
 //! The parking report: from what was seen to what is drawn.
 
 use kerbside_geometry::Pose;
-use kerbside_messages::{Mode, Odometry, Truth};
+use kerbside_messages::{EstimatorState, Mode, Odometry, Truth};
 use kerbside_reports::{
     CommandSample, EstimateSample, Event, EventKind, Figures, Latency, Motion, Outcome, ParkReport,
     Phase, Plan, ProcessFigures, Provenance, Scene, svg::Tone,
@@ -29,7 +29,7 @@ pub fn of(job: &Job, run: &Run, verdict: &Verdict) -> ParkReport {
         figures: figures(trace, verdict),
         latency: latency(job, trace),
         plans: trace.plans.iter().map(|plan| plan_of(trace, plan)).collect(),
-        estimate: trace.odometry.iter().map(|odometry| estimate_of(trace, odometry)).collect(),
+        estimate: located(trace).map(|odometry| estimate_of(trace, odometry)).collect(),
         truth: trace.truth.iter().map(|truth| truth_of(trace, truth)).collect(),
         commands: trace.commands.iter().map(|command| command_of(trace, command)).collect(),
         phases: phases(trace),
@@ -102,6 +102,11 @@ fn plan_of(trace: &Trace, plan: &Followed) -> Plan {
         steering: point.steering,
     };
     Plan { points: plan.points.iter().map(motion).collect() }
+}
+
+/// The estimates from the first fix on: before it their frame is not the map's.
+fn located(trace: &Trace) -> impl Iterator<Item = &Odometry> {
+    trace.odometry.iter().skip_while(|odometry| odometry.state == EstimatorState::Unset.code())
 }
 
 fn estimate_of(trace: &Trace, odometry: &Odometry) -> EstimateSample {

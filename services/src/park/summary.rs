@@ -157,7 +157,12 @@ fn print_one(one: &Finished) {
     row("deadline misses", trace.misses().to_string());
     row("restarts", trace.restarts().to_string());
     println!("{table}");
-    println!("report     {}", one.report.display());
+    if let Some(instance) = &run.instance {
+        println!("instance   {instance}");
+    }
+    if let Some(report) = &one.report {
+        println!("report     {}", report.display());
+    }
     if let Some(recording) = &run.recording {
         println!("recording  {}", recording.display());
     }
@@ -216,7 +221,7 @@ fn print_many(finished: &[Finished], figures: &[Figure]) {
     for figure in figures {
         println!("{figure}");
     }
-    if let Some(folder) = finished.first().and_then(|one| one.report.parent()?.parent()) {
+    if let Some(folder) = finished.first().and_then(|one| one.report.as_ref()?.parent()?.parent()) {
         println!("reports    {}", folder.display());
     }
 }

@@ -217,7 +217,13 @@ impl Trace {
     pub fn recorder_says(&self) -> Option<String> {
         let state = self.state?;
         let row = *state.rows().iter().find(|row| row.process == Process::Recorder as u8)?;
-        Some(text::as_str(&row.waiting_for).to_owned()).filter(|said| !said.is_empty())
+        let said = text::as_str(&row.waiting_for);
+        match (row.restarts, said) {
+            (0, "") => None,
+            (0, said) => Some(said.to_owned()),
+            (_, "") => Some("recorder restarted: the recording is in parts".to_owned()),
+            (_, said) => Some(format!("recorder restarted: the recording is in parts; {said}")),
+        }
     }
 }
 

@@ -63,7 +63,7 @@ impl Children {
     pub async fn exited(&mut self) -> Option<(Process, Exit)> {
         let (process, exit) = self.receiver.recv().await?;
         let pid = self.pids.remove(&process);
-        tracing::info!(%process, pid, %exit, "ended");
+        tracing::info!(%process, pid, how = %exit, "ended");
         Some((process, exit))
     }
 

@@ -10,7 +10,7 @@ mod sweeper;
 use core::time::Duration;
 use std::collections::BTreeMap;
 
-use kerbside_messages::{Mode, OperatorAnswer, OperatorRequest, Process};
+use kerbside_messages::{Mode, OperatorAnswer, OperatorRequest, Process, Verb};
 use kerbside_runtime::{Asked, FileLock, Services, kill, now};
 use kerbside_safety::{Action, Actions, Event, Supervised, Supervisor, bounds};
 use tokio::signal::unix::{SignalKind, signal};
@@ -105,6 +105,7 @@ impl<'a> Acting<'a> {
         cycle.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut interrupt = signal(SignalKind::interrupt()).map_err(Failure::internal)?;
         let mut terminate = signal(SignalKind::terminate()).map_err(Failure::internal)?;
+        let mut hangup = signal(SignalKind::hangup()).map_err(Failure::internal)?;
         let door = self.ports.door().map_err(Failure::internal)?;
         let mut ready = Some(ready);
         let exit = loop {
@@ -117,6 +118,7 @@ impl<'a> Acting<'a> {
                 () = door.wait() => {}
                 _ = interrupt.recv() => self.event(Event::Shutdown),
                 _ = terminate.recv() => self.event(Event::Shutdown),
+                _ = hangup.recv() => self.event(Event::Shutdown),
             }
             self.take_in();
             if tick {
@@ -166,7 +168,8 @@ impl<'a> Acting<'a> {
         self.next_id += 1;
         let mut request = *asked.request();
         request.id = id;
-        tracing::info!(verb = request.verb, pid = request.pid, "operator asks");
+        let verb = Verb::from_code(request.verb).map_or("unknown", Verb::name);
+        tracing::info!(verb, pid = request.pid, "operator asks");
         self.asked.insert(id, asked);
         if let Some(event) = Event::of_request(&request) {
             self.event(event);
@@ -201,7 +204,7 @@ impl<'a> Acting<'a> {
             }
             Action::Answer(answer) => self.answer(answer),
             Action::Entered { mode, cause, culprit } => {
-                let culprit = culprit.map_or("", Process::name);
+                let culprit = culprit.map(Process::name);
                 tracing::info!(%mode, %cause, culprit, "mode");
             }
             Action::Failed { process, cause } => tracing::warn!(%process, %cause, "failed"),

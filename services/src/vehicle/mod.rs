@@ -3,7 +3,7 @@
 //! It makes a pseudo-terminal, links its line end in the instance's folder, and drives on its own clock whether
 //! anybody listens or not. Topics out: `truth`, while there is a supervisor.
 
-mod pty;
+pub(crate) mod pty;
 mod reporter;
 mod stage;
 
@@ -12,7 +12,7 @@ use std::sync::atomic::Ordering;
 
 use kerbside_geometry::{Pose, angle};
 use kerbside_messages::{Nanos, Process, Truth};
-use kerbside_runtime::{FileLock, LockError, Ticker, now, poll_readable};
+use kerbside_runtime::{FileLock, Instance, LockError, Ticker, now, poll_readable};
 
 pub use stage::{Making, VehicleStage};
 
@@ -24,6 +24,11 @@ use reporter::Reporter;
 
 /// A pause of the process longer than this stops the vehicle's time: it was stopped, not late \[ns\].
 const PAUSE: Nanos = 250_000_000;
+
+/// A vehicle that belongs to a stack ends once there was no supervisor for so long \[ns\].
+const ABANDONED: Nanos = 60_000_000_000;
+/// Time between looks for the supervisor \[ns\].
+const LOOK: Nanos = 1_000_000_000;
 
 /// What the simulated vehicle is started with.
 #[derive(Clone, Debug, clap::Args)]
@@ -40,6 +45,9 @@ pub struct VehicleArgs {
     /// End together with the process that started this one.
     #[arg(long, value_name = "PID", hide = true)]
     pub with_parent: Option<u32>,
+    /// End once the instance has had no supervisor for a minute.
+    #[arg(long, hide = true)]
+    pub with_stack: bool,
 }
 
 /// A pose as people write it: metres and degrees.
@@ -88,12 +96,16 @@ pub fn run(args: &VehicleArgs, service: Service) -> Result<Exit, Failure> {
         silence: service.safety().timeouts.vehicle_silence,
     });
     tracing::info!(line = %pty.name().display(), vehicle = service.vehicle.name, "simulated vehicle");
-    drive(&stop, &mut pty, &mut stage, &reporter);
+    let mut watch = args.with_stack.then(|| StackWatch::new(&service));
+    let mut goes_on = |now| {
+        !stop.load(Ordering::Relaxed) && watch.as_mut().is_none_or(|watch| watch.goes_on(now))
+    };
+    drive(&mut goes_on, &mut pty, &mut stage, &reporter);
     Ok(Exit::Good)
 }
 
 fn drive(
-    stop: &std::sync::atomic::AtomicBool,
+    goes_on: &mut dyn FnMut(Nanos) -> bool,
     pty: &mut Pty,
     stage: &mut VehicleStage,
     reporter: &Reporter,
@@ -101,7 +113,7 @@ fn drive(
     let mut tick = Ticker::new(core::time::Duration::from_nanos(stage.period()));
     let mut clock = OwnClock { time: 0, seen: now() };
     let mut buffer = [0; 4096];
-    while !stop.load(Ordering::Relaxed) {
+    while goes_on(clock.seen) {
         poll_readable(&[pty.as_fd()], tick.next());
         let host = now();
         let time = clock.advance(host, stage.period());
@@ -119,6 +131,29 @@ fn drive(
             stage.truth(host, &mut truth);
             reporter.tell(&truth);
         }
+    }
+}
+
+/// A vehicle that belongs to a stack waits for the next supervisor when one was killed, but not for ever.
+struct StackWatch {
+    instance: Instance,
+    supervised: Nanos,
+    next: Nanos,
+}
+
+impl StackWatch {
+    fn new(service: &Service) -> Self {
+        Self { instance: service.instance.clone(), supervised: now(), next: 0 }
+    }
+
+    fn goes_on(&mut self, now: Nanos) -> bool {
+        if now >= self.next {
+            self.next = now + LOOK;
+            if self.instance.supervisor().is_some() {
+                self.supervised = now;
+            }
+        }
+        now.saturating_sub(self.supervised) <= ABANDONED
     }
 }
 
@@ -166,6 +201,19 @@ mod tests {
         assert_eq!(clock.advance(1_000 + nanos(0.005), nanos(0.005)), nanos(0.005));
         assert_eq!(clock.advance(1_000 + nanos(3.0), nanos(0.005)), nanos(0.010));
         assert_eq!(clock.advance(1_000 + nanos(3.005), nanos(0.005)), nanos(0.015));
+    }
+
+    #[test]
+    fn a_stack_s_vehicle_waits_a_minute_for_the_next_supervisor() {
+        let base = tempfile::tempdir_in("/tmp").unwrap();
+        let instance = Instance::below(base.path(), "one").unwrap();
+        let mut watch = StackWatch { instance: instance.clone(), supervised: 0, next: 0 };
+        assert!(watch.goes_on(ABANDONED));
+        let lock = instance.lock().unwrap();
+        assert!(watch.goes_on(ABANDONED + LOOK), "supervised again");
+        drop(lock);
+        assert!(watch.goes_on(2 * ABANDONED));
+        assert!(!watch.goes_on(2 * ABANDONED + 2 * LOOK));
     }
 
     #[test]

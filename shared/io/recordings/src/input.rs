@@ -117,28 +117,36 @@ impl RawInput {
     /// # Errors
     /// Whatever in the files is not as it should be.
     pub fn open(source: &Source, vehicle: Option<&Path>) -> Result<Self, InputError> {
+        Self::open_as(source, vehicle.map(read_vehicle).transpose()?)
+    }
+
+    /// The same with the text that describes the vehicle, where one is given.
+    ///
+    /// # Errors
+    /// Whatever in the files is not as it should be.
+    pub fn open_as(source: &Source, vehicle: Option<VehicleText>) -> Result<Self, InputError> {
         match source {
             Source::Run(path) => Self::open_run(path, vehicle),
             Source::Recording(path) => Self::open_recording(path, vehicle),
         }
     }
 
-    fn open_run(path: &Path, vehicle: Option<&Path>) -> Result<Self, InputError> {
+    fn open_run(path: &Path, vehicle: Option<VehicleText>) -> Result<Self, InputError> {
         let run = Run::read(path)?;
         let beside = run_folder::vehicle_of(path)?;
         if vehicle.is_none() && !beside.is_file() {
             return Err(InputError::NoVehicle { input: path.into(), path: beside });
         }
-        let vehicle = read_vehicle(vehicle.unwrap_or(&beside))?;
+        let vehicle = vehicle.map_or_else(|| read_vehicle(&beside), Ok)?;
         let name = run.about.info.name.clone();
         Ok(Self { name, path: path.into(), vehicle, content: Content::Run(Box::new(run)) })
     }
 
-    fn open_recording(path: &Path, vehicle: Option<&Path>) -> Result<Self, InputError> {
+    fn open_recording(path: &Path, vehicle: Option<VehicleText>) -> Result<Self, InputError> {
         let reader = RecordingReader::open(path)?;
         let attached = reader.provenance().vehicle.clone();
         let vehicle = match (vehicle, attached) {
-            (Some(given), _) => read_vehicle(given)?,
+            (Some(given), _) => given,
             (None, Some(text)) => VehicleText { origin: path.into(), text },
             (None, None) => {
                 let missing = PathBuf::from("attachment vehicle.toml");

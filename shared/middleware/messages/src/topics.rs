@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use crate::payloads::{
     Actuator, Command, Fix, Heartbeat, Inhibit, Odometry, OperatorAnswer, OperatorRequest, Permit,
-    Plan, PlanAnswer, PlanRequest, Raw, Restore, State, Travel, Truth,
+    Plan, PlanAnswer, PlanRequest, Raw, Restore, State, Travel, Truth, Uptake,
 };
 use crate::{Header, Message, Refusal};
 
@@ -224,12 +224,15 @@ const fn ms(limit: u64) -> Option<Duration> {
     Some(Duration::from_millis(limit))
 }
 
+/// Samples kept for a subscriber that takes every one of the control path.
+pub const IN_ORDER: usize = 512;
+
 topics! {
-    1 RAW "raw" Raw, one(Process::Interface) => [Ingest, Recorder], wakes Some(Process::Ingest), 200.0 Hz, fresh ms(100), all(512), protected true, recorded true,
+    1 RAW "raw" Raw, one(Process::Interface) => [Ingest, Recorder], wakes Some(Process::Ingest), 200.0 Hz, fresh ms(100), all(IN_ORDER), protected true, recorded true,
         "What the vehicle reported: counts, steering and yaw rate as read, each with a mask.";
-    2 TRAVEL "travel" Travel, one(Process::Ingest) => [Estimator, Recorder], wakes Some(Process::Estimator), 200.0 Hz, fresh ms(100), all(512), protected true, recorded true,
+    2 TRAVEL "travel" Travel, one(Process::Ingest) => [Estimator, Recorder], wakes Some(Process::Estimator), 200.0 Hz, fresh ms(100), all(IN_ORDER), protected true, recorded true,
         "Each wheel's travel since the counter epoch, its increment and validity; a gap is a gap.";
-    3 ODOMETRY "odometry" Odometry, one(Process::Estimator) => [Tracker, Planner, Interface, Supervisor, Recorder], wakes Some(Process::Tracker), 200.0 Hz, fresh ms(100), all(512), protected true, recorded true,
+    3 ODOMETRY "odometry" Odometry, one(Process::Estimator) => [Tracker, Planner, Interface, Supervisor, Recorder], wakes Some(Process::Tracker), 200.0 Hz, fresh ms(100), all(IN_ORDER), protected true, recorded true,
         "The pose estimate with twist, covariance and the filter's own statistics; one per travel.";
     4 RESTORE "restore" Restore, one(Process::Supervisor) => [Estimator, Recorder], wakes None, 0.0 Hz, fresh None, Delivery::Newest, protected true, recorded true,
         "The newest valid odometry, for an estimator that was restarted.";
@@ -259,4 +262,6 @@ topics! {
         "What an operator asks of the supervisor: arm, stop, down.";
     17 OPERATOR_ANSWER "operator_answer" OperatorAnswer, one(Process::Supervisor) => [], wakes None, 0.0 Hz, fresh None, Delivery::RequestResponse, protected true, recorded false,
         "The supervisor's answer: done, or why not.";
+    18 UPTAKE "uptake" Uptake, Publisher::Any => [Interface], wakes Some(Process::Interface), 0.0 Hz, fresh None, all(64), protected false, recorded false,
+        "In a replay: how far each reader of odometry has come, so that the replay waits for it.";
 }

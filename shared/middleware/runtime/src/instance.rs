@@ -96,7 +96,7 @@ impl Instance {
         let instance = Self { name: name.to_owned(), folder: base.join(name) };
         let (length, allowed) = (instance.root().as_os_str().len(), SOCKET_PATH - SOCKET_NAME);
         if length > allowed {
-            return Err(InstanceError::TooDeep { folder: instance.folder, length, allowed });
+            return Err(InstanceError::TooDeep { folder: instance.root(), length, allowed });
         }
         Ok(instance)
     }
@@ -183,10 +183,14 @@ impl Instance {
     /// [`InstanceError::Busy`] where it has a supervisor, [`InstanceError::File`] where the lock cannot be used.
     pub fn lock(&self) -> Result<FileLock, InstanceError> {
         self.create_folder()?;
-        FileLock::take(&self.process_lock(Process::Supervisor)).map_err(|error| match error {
+        let taken = FileLock::take(&self.process_lock(Process::Supervisor));
+        let lock = taken.map_err(|error| match error {
             LockError::Held { pid, .. } => InstanceError::Busy { name: self.name.clone(), pid },
             LockError::File { path, source } => InstanceError::File { path, source },
-        })
+        })?;
+        // From now on the instance counts as supervised: nobody may join what an earlier life left.
+        remove_file(&self.configuration())?;
+        Ok(lock)
     }
 
     /// The pid of its supervisor; none where it has none.

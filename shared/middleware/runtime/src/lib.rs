@@ -13,6 +13,7 @@
 // Shared memory wants promises that the compiler cannot check: each block says why it holds.
 #![allow(unsafe_code)]
 
+mod bare;
 mod clock;
 mod error;
 mod instance;
@@ -27,13 +28,17 @@ mod subscriber;
 mod wait;
 mod wire;
 
+pub use bare::{
+    BarePlanPublisher, BarePlanSubscriber, BarePublisher, BareReceived, BareServices,
+    BareSubscriber, bare_listener, bare_notifier,
+};
 pub use clock::{Ticker, now};
 pub use error::RuntimeError;
 pub use instance::{Instance, InstanceError, MAX_NAME};
 pub use lock::{FileLock, LockError};
-pub use process::{close_inherited_on_exec, kill, terminate};
+pub use process::{close_inherited_on_exec, end_on_broken_pipe, kill, resume, terminate};
 pub use publisher::{PlanPublisher, Publisher};
-pub use realtime::{RealtimeReport, RealtimeRequest, enter_realtime};
+pub use realtime::{RealtimeReport, RealtimeRequest, enter_realtime, last_core};
 pub use request::{Asked, Client, Pending, Server};
 pub use services::{Services, depth};
 pub use session::{Session, SessionError, SweepReport};

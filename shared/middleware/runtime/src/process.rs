@@ -11,6 +11,15 @@ pub fn close_inherited_on_exec() {
     }
 }
 
+/// Ends this process in silence when nobody reads its output any more, as people expect of a command in a pipe. Only
+/// for verbs that do nothing but print.
+pub fn end_on_broken_pipe() {
+    // SAFETY: the default action takes the place of an ignored signal; no handler of ours runs.
+    unsafe {
+        libc::signal(libc::SIGPIPE, libc::SIG_DFL);
+    }
+}
+
 /// Asks a process to end.
 pub fn terminate(pid: u32) {
     signal(pid, Signal::TERM);
@@ -19,6 +28,11 @@ pub fn terminate(pid: u32) {
 /// Ends a process, stopped or not.
 pub fn kill(pid: u32) {
     signal(pid, Signal::KILL);
+}
+
+/// Lets a stopped process go on, so that it hears what it was asked.
+pub fn resume(pid: u32) {
+    signal(pid, Signal::CONT);
 }
 
 fn signal(pid: u32, signal: Signal) {

@@ -1,11 +1,7 @@
 //! Real-time scheduling, locked memory and core pinning, as far as the rights go.
 
 use rustix::mm::{MlockAllFlags, mlockall};
-use rustix::thread::{CpuSet, sched_setaffinity};
-use thread_priority::{
-    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy,
-    set_thread_priority_and_policy, thread_native_id,
-};
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 
 /// What is asked for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -56,9 +52,40 @@ pub fn enter_realtime(request: &RealtimeRequest) -> RealtimeReport {
     report
 }
 
-fn schedule(priority: u8) -> Result<(), String> {
-    let value = priority.try_into().map_err(|error: &str| error.to_owned())?;
-    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-    set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy)
-        .map_err(|error| format!("{error:?}"))
+/// The calling thread alone: threads and processes that it starts begin with the ordinary scheduler again, else a search
+/// or a recording would run before the control path.
+/// The last of the cores the calling thread may run on; none where it has no choice.
+#[must_use]
+pub fn last_core() -> Option<usize> {
+    let allowed = sched_getaffinity(None).ok()?;
+    let mut cores = (0..CpuSet::MAX_CPU).filter(|core| allowed.is_set(*core)).rev();
+    let last = cores.next()?;
+    cores.next().map(|_| last)
+}
+
+fn schedule(priority: u8) -> std::io::Result<()> {
+    let parameter = libc::sched_param { sched_priority: libc::c_int::from(priority) };
+    let policy = libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK;
+    // SAFETY: the parameter outlives the call, which only reads it; 0 means the calling thread.
+    match unsafe { libc::sched_setscheduler(0, policy, &raw const parameter) } {
+        0 => Ok(()),
+        _ => Err(std::io::Error::last_os_error()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_on_one_core_has_no_choice() {
+        let choice = last_core();
+        assert_eq!(choice.is_some(), std::thread::available_parallelism().unwrap().get() > 1);
+        if let Some(last) = choice {
+            let request = RealtimeRequest { cores: vec![last], ..RealtimeRequest::default() };
+            let pinned = std::thread::spawn(move || (enter_realtime(&request), last_core()));
+            assert_eq!(pinned.join().unwrap(), (RealtimeReport::default(), None));
+            assert_eq!(last_core(), choice, "only the other thread was pinned");
+        }
+    }
 }

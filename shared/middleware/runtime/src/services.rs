@@ -7,7 +7,7 @@ use iceoryx2::prelude::{NodeState, ServiceName, ipc};
 use kerbside_messages::{
     Actuator, Command, Delivery, Fix, Heartbeat, Inhibit, Message, Odometry, OperatorAnswer,
     OperatorRequest, Permit, Plan, PlanAnswer, PlanRequest, Process, Publisher, Raw, Restore,
-    State, Topic, Travel, Truth,
+    State, Topic, Travel, Truth, Uptake,
 };
 
 use crate::error::{Context, RuntimeError};
@@ -116,6 +116,7 @@ fn create_all(node: &Node<ipc::Service>) -> Result<Vec<Box<dyn Any>>, SessionErr
         create::<Heartbeat>(node, Some(process), &mut made)?;
     }
     create::<Truth>(node, None, &mut made)?;
+    create::<Uptake>(node, None, &mut made)?;
     create_door::<PlanRequest, PlanAnswer>(node, &mut made)?;
     create_door::<OperatorRequest, OperatorAnswer>(node, &mut made)?;
     Ok(made)

@@ -84,7 +84,8 @@ impl Session {
     /// # Errors
     /// [`SessionError::Missing`] as long as no supervisor has set the instance up.
     pub fn join(instance: &Instance, process: Process) -> Result<Self, SessionError> {
-        if !instance.configuration().exists() {
+        // What a supervisor that was killed left behind is no instance, until the next one has swept it away.
+        if instance.supervisor().is_none() || !instance.configuration().exists() {
             return Err(SessionError::Missing {
                 what: "the supervisor".to_owned(),
                 instance: instance.name().to_owned(),

@@ -11,7 +11,7 @@ const SPREAD: f64 = 1e-6;
 /// The rigid transform that lays the estimate on the reference at one place.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Alignment {
-    reference_from_estimate: Pose,
+    pub(super) reference_from_estimate: Pose,
     /// Distance at the middle of the place \[m\].
     pub(super) middle: f64,
 }

@@ -155,8 +155,7 @@ pub fn drift(
     if distance < SHORTEST {
         return Err(DriftError::Short { distance });
     }
-    let with_yaw = samples.iter().all(|sample| sample.reference_yaw.is_some());
-    let by = if with_yaw { AlignedBy::Pose } else { AlignedBy::Path };
+    let by = aligned_by(&samples);
     let window = window_length(distance);
     let spans: Vec<Span> =
         windows(&samples, window).filter_map(|part| window_span(part, by)).collect();
@@ -175,6 +174,24 @@ pub fn drift(
         window,
         windows: spans.len(),
     })
+}
+
+/// The pose of the estimate's frame in the reference's, as the two are aligned at the run's beginning
+/// for the end error; none where no direction can be found.
+#[must_use]
+pub fn reference_from_estimate(
+    estimates: &[EstimatedPose],
+    references: &[ReferencePose],
+    body_from_marker: &Pose,
+) -> Option<Pose> {
+    let samples = samples_of(estimates, references, body_from_marker);
+    let by = aligned_by(&samples);
+    Some(Alignment::over(beginning(&samples, by), by)?.reference_from_estimate)
+}
+
+fn aligned_by(samples: &[Sample]) -> AlignedBy {
+    let with_yaw = samples.iter().all(|sample| sample.reference_yaw.is_some());
+    if with_yaw { AlignedBy::Pose } else { AlignedBy::Path }
 }
 
 /// Length of a window for a drive of `distance` \[m\].
@@ -202,19 +219,36 @@ fn window_span(window: &[Sample], by: AlignedBy) -> Option<Span> {
 fn run_span(samples: &[Sample], by: AlignedBy) -> Option<Span> {
     match by {
         AlignedBy::Pose => {
-            // The pose next to the motion is left out: the car may have begun to move, or may not
-            // have come to rest, less than a count ago.
-            let (start, end) = (head(samples, STAND), tail(samples, STAND));
-            let start = &start[..start.len().saturating_sub(1).max(1)];
-            Span::between(start, &end[usize::from(end.len() > 1)..], by)
+            let end = tail(samples, STAND);
+            Span::between(beginning(samples, by), &end[usize::from(end.len() > 1)..], by)
         }
         AlignedBy::Path => path_span(samples),
     }
 }
 
+/// The place at a run's beginning where the two are aligned.
+///
+/// Of a stand the pose next to the motion is left out, at the end as well: the car may have begun to
+/// move, or may not have come to rest, less than a count ago.
+fn beginning(samples: &[Sample], by: AlignedBy) -> &[Sample] {
+    match by {
+        AlignedBy::Pose => {
+            let stand = head(samples, STAND);
+            &stand[..stand.len().saturating_sub(1).max(1).min(stand.len())]
+        }
+        AlignedBy::Path => head(samples, tenth(samples)),
+    }
+}
+
 fn path_span(samples: &[Sample]) -> Option<Span> {
-    let tenth = 0.1 * (samples.last()?.distance - samples.first()?.distance);
-    Span::between(head(samples, tenth), tail(samples, tenth), AlignedBy::Path)
+    let (start, end) = (beginning(samples, AlignedBy::Path), tail(samples, tenth(samples)));
+    Span::between(start, end, AlignedBy::Path)
+}
+
+/// A tenth of the distance \[m\]; 0 where there is none.
+fn tenth(samples: &[Sample]) -> f64 {
+    let distance = |sample: Option<&Sample>| sample.map_or(0.0, |sample| sample.distance);
+    0.1 * (distance(samples.last()) - distance(samples.first()))
 }
 
 /// The samples up to `length` \[m\] from the first.

@@ -28,7 +28,7 @@ pub use parts::Damage;
 pub use provenance::Provenance;
 pub use reader::{Record, RecordingReader, Records};
 pub use recover::{RecoverReport, recover};
-pub use writer::{CHUNK_AGE, CHUNK_BYTES, Closed, RecordingWriter, WriteError};
+pub use writer::{CHUNK_AGE, CHUNK_BYTES, Chunks, Closed, RecordingWriter, WriteError};
 
 use kerbside_messages::Topic;
 use kerbside_messages::topics::TABLE;

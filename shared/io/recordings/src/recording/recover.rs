@@ -12,7 +12,7 @@ use super::definitions::Definitions;
 use super::error::RecordingError;
 use super::index::{self, HEAD, Index};
 use super::parts::{Damage, Parts};
-use super::writer::{Container, container};
+use super::writer::{Chunks, Container, container};
 
 /// What was recovered, and what was not.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -67,7 +67,7 @@ fn copy(
 ) -> Result<RecoverReport, RecordingError> {
     let to_error =
         |error: McapError| RecordingError::Write { path: out.into(), source: error.into() };
-    let mut container = container(file).map_err(to_error)?;
+    let mut container = container(file, Chunks::default()).map_err(to_error)?;
     copy_asides(index, &mut container, &to_error)?;
     define(definitions, &mut container).map_err(to_error)?;
     let mut report = RecoverReport { lost: index.damaged.clone(), ..RecoverReport::default() };

@@ -140,6 +140,24 @@ fn chunks_close_by_size_by_age_and_on_demand() {
 }
 
 #[test]
+fn chunks_are_as_large_and_as_packed_as_asked_for() {
+    let size = |chunks: Chunks| {
+        let (_folder, path) = place();
+        let mut writer =
+            RecordingWriter::create_in_chunks(&path, &provenance(), 5, chunks).unwrap();
+        write_raws(&mut writer, 1..101);
+        let closed = writer.finish().unwrap();
+        assert_eq!(frames(&path), (1..101).collect::<Vec<_>>());
+        (closed.chunks, check(&path).unwrap().bytes)
+    };
+    let small = size(Chunks { bytes: 4096, compressed: true });
+    let large = size(Chunks { bytes: CHUNK_BYTES, compressed: true });
+    let loose = size(Chunks { bytes: CHUNK_BYTES, compressed: false });
+    assert!(small.0 > large.0 && large.0 == loose.0, "{small:?} {large:?} {loose:?}");
+    assert!(large.1 < loose.1, "{large:?} {loose:?}");
+}
+
+#[test]
 fn a_killed_recorder_leaves_its_closed_chunks() {
     let (folder, path) = place();
     let mut writer = RecordingWriter::create(&path, &provenance(), 5).unwrap();
@@ -256,7 +274,8 @@ fn lost_definitions_are_made_good_by_the_index() {
 #[test]
 fn another_layout_is_named_with_its_version() {
     let (_folder, path) = place();
-    let mut container = super::writer::container(std::fs::File::create(&path).unwrap()).unwrap();
+    let file = std::fs::File::create(&path).unwrap();
+    let mut container = super::writer::container(file, Chunks::default()).unwrap();
     let schema = container.add_schema("kerbside/msg/Raw", "ros2msg", b"uint8 x").unwrap();
     let version = [("layout_version".to_owned(), "9".to_owned())].into();
     let channel = container.add_channel(schema, "/kerbside/raw", "cdr", &version).unwrap();

@@ -22,6 +22,21 @@ pub const CHUNK_BYTES: usize = 256 * 1024;
 /// A chunk is closed once it spans so much time \[ns\].
 pub const CHUNK_AGE: Nanos = 1_000_000_000;
 
+/// How a recording is cut into chunks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chunks {
+    /// A chunk is closed once it holds so many bytes before compression.
+    pub bytes: usize,
+    /// Whether they are compressed (LZ4).
+    pub compressed: bool,
+}
+
+impl Default for Chunks {
+    fn default() -> Self {
+        Self { bytes: CHUNK_BYTES, compressed: true }
+    }
+}
+
 /// Why something was not recorded. After the first of the writing errors nothing is recorded any
 /// more, and nothing else is harmed.
 #[derive(Debug, thiserror::Error)]
@@ -81,11 +96,11 @@ pub(super) type Container<W> = mcap::Writer<NoSeek<BufWriter<W>>>;
 
 /// An MCAP container on `sink` whose chunks are closed by [`mcap::Writer::flush`] alone. A chunk is
 /// put together in memory, so that the file never holds one without its length.
-pub(super) fn container<W: Write>(sink: W) -> Result<Container<W>, McapError> {
+pub(super) fn container<W: Write>(sink: W, chunks: Chunks) -> Result<Container<W>, McapError> {
     WriteOptions::new()
         .profile("ros2")
         .library(concat!("kerbside ", env!("CARGO_PKG_VERSION")))
-        .compression(Some(Compression::Lz4))
+        .compression(chunks.compressed.then_some(Compression::Lz4))
         .chunk_size(None)
         .disable_seeking(true)
         .create(NoSeek::new(BufWriter::with_capacity(CHUNK_BYTES, sink)))
@@ -99,7 +114,7 @@ enum State<W: Write> {
 
 /// A recording that is being written.
 ///
-/// A chunk is closed, and handed to the operating system, when it holds [`CHUNK_BYTES`] or spans
+/// A chunk is closed, and handed to the operating system, when it holds [`Chunks::bytes`] or spans
 /// [`CHUNK_AGE`], whichever comes first; where nothing is recorded for a while,
 /// [`RecordingWriter::close_chunk_if_older`] sees to the second.
 ///
@@ -111,6 +126,7 @@ pub struct RecordingWriter<W: Write> {
     /// Log time of the first message of the open chunk, and bytes in it.
     open_since: Option<Nanos>,
     open_bytes: usize,
+    chunk_bytes: usize,
     closed: Closed,
 }
 
@@ -120,7 +136,20 @@ impl RecordingWriter<File> {
     /// # Errors
     /// [`WriteError`].
     pub fn create(path: &Path, provenance: &Provenance, now: Nanos) -> Result<Self, WriteError> {
-        Self::new(File::create_new(path)?, provenance, now)
+        Self::create_in_chunks(path, provenance, now, Chunks::default())
+    }
+
+    /// The same in other chunks than the usual ones.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn create_in_chunks(
+        path: &Path,
+        provenance: &Provenance,
+        now: Nanos,
+        chunks: Chunks,
+    ) -> Result<Self, WriteError> {
+        Self::in_chunks(File::create_new(path)?, provenance, now, chunks)
     }
 }
 
@@ -131,7 +160,20 @@ impl<W: Write> RecordingWriter<W> {
     /// # Errors
     /// [`WriteError`].
     pub fn new(sink: W, provenance: &Provenance, now: Nanos) -> Result<Self, WriteError> {
-        let mut container = container(sink)?;
+        Self::in_chunks(sink, provenance, now, Chunks::default())
+    }
+
+    /// The same in other chunks than the usual ones.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn in_chunks(
+        sink: W,
+        provenance: &Provenance,
+        now: Nanos,
+        chunks: Chunks,
+    ) -> Result<Self, WriteError> {
+        let mut container = container(sink, chunks)?;
         write_provenance(&mut container, provenance, now)?;
         let channels = write_channels(&mut container)?;
         container.flush()?;
@@ -141,6 +183,7 @@ impl<W: Write> RecordingWriter<W> {
             cdr: Vec::with_capacity(CHUNK_BYTES),
             open_since: None,
             open_bytes: 0,
+            chunk_bytes: chunks.bytes,
             closed: Closed::default(),
         })
     }
@@ -173,7 +216,7 @@ impl<W: Write> RecordingWriter<W> {
         written?;
         self.closed.messages += 1;
         self.open_since.get_or_insert(log_time);
-        if self.open_bytes >= CHUNK_BYTES {
+        if self.open_bytes >= self.chunk_bytes {
             return self.close_chunk();
         }
         self.close_chunk_if_older(log_time).map(|_| ())

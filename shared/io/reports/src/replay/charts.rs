@@ -170,6 +170,7 @@ mod tests {
             travel: Vec::new(),
             gaps: Vec::new(),
             refusals: Vec::new(),
+            notes: Vec::new(),
             provenance: Provenance::default(),
         };
         let (distance, heading) = report.errors();

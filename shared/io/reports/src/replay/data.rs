@@ -28,9 +28,9 @@ pub struct ReplayReport {
     pub odometry_sha256: String,
     /// The odometry model and what the vehicle lacks.
     pub model: Model,
-    /// The odometry, in the reference's frame where there is one.
+    /// The odometry; where there is a reference, of the reference's marker and in its frame.
     pub odometry: Vec<Motion>,
-    /// The reference; a yaw that is unknown is not a number.
+    /// The reference, of the marker as well; a yaw that is unknown is not a number.
     pub reference: Vec<Motion>,
     /// Drift against the reference; none without one.
     pub drift: Option<Drift>,
@@ -40,6 +40,8 @@ pub struct ReplayReport {
     pub gaps: Vec<Gap>,
     /// Readings that were refused, by reason.
     pub refusals: Vec<RefusalCount>,
+    /// What else is to be known, a sentence each.
+    pub notes: Vec<String>,
     /// What it takes to repeat it.
     pub provenance: Provenance,
 }
@@ -56,16 +58,16 @@ pub struct Model {
 }
 
 /// How far odometry went astray.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Drift {
-    /// Error of the end position over the distance \[%\].
+    /// Error of position over the distance, median over windows \[%\].
     pub position_percent: f64,
-    /// Error of the end heading over the distance \[rad/m\]; none where the reference has no
-    /// heading.
-    pub heading_per_metre: Option<f64>,
-    /// End pose of the odometry seen from the reference's; its yaw is not a number where the
-    /// reference has none.
+    /// Error of heading over the distance, median over windows \[rad/m\].
+    pub heading_per_metre: f64,
+    /// Odometry minus reference at the end, along the axes of the reference's frame.
     pub end_error: Pose,
+    /// How this was measured, for people: windows, alignment.
+    pub basis: String,
 }
 
 /// Travel of a wheel.

@@ -27,6 +27,7 @@ impl ReplayReport {
     #[must_use]
     pub fn page(&self) -> Page {
         let mut sections = vec![self.path_section(), self.motion_section()];
+        sections.extend(self.note_section());
         sections.push(self.model_section());
         sections.push(self.gap_section());
         sections.push(self.provenance.section());
@@ -46,7 +47,7 @@ impl ReplayReport {
             || "There is no reference to hold the odometry against.".to_owned(),
             |drift| {
                 format!(
-                    "Odometry ended {} of the distance away from the reference.",
+                    "Odometry drifts from the reference by {} of the distance.",
                     percent(drift.position_percent)
                 )
             },
@@ -59,16 +60,17 @@ impl ReplayReport {
     }
 
     fn key_figures(&self) -> Vec<KeyFigure> {
-        let heading = self.drift.and_then(|drift| drift.heading_per_metre);
+        let drifted = self.drift.as_ref();
+        let heading = drifted.map(|drift| drift.heading_per_metre);
         let gaps = self.gaps.len() as u64;
         let refused = self.refusals.iter().map(|refusal| refusal.count).sum();
         let speed = format!("{}\u{202f}\u{d7}", format::three_digits(self.speed_factor));
         let speed = if self.speed_factor.is_finite() { speed } else { UNKNOWN.to_owned() };
-        let end = self.drift.map(|drift| math::hypot(drift.end_error.x, drift.end_error.y));
-        let drift = self.drift.map(|drift| drift.position_percent);
+        let end = drifted.map(|drift| math::hypot(drift.end_error.x, drift.end_error.y));
+        let drift = drifted.map(|drift| drift.position_percent);
         vec![
-            KeyFigure::plain("Position drift", format::optional(drift, percent), "of the distance"),
-            KeyFigure::plain("Heading drift", format::optional(heading, per_metre), "at the end"),
+            KeyFigure::plain("Position drift", format::optional(drift, percent), "of the distance, median"),
+            KeyFigure::plain("Heading drift", format::optional(heading, per_metre), "median"),
             KeyFigure::plain("End error", format::optional(end, format::metres), "position"),
             KeyFigure::plain("Distance", format::metres(self.distance), "both directions added"),
             KeyFigure::plain("Duration", format::seconds(self.duration), "of the drive"),
@@ -90,13 +92,21 @@ impl ReplayReport {
         if !self.reference.is_empty() {
             blocks.push(beside(self.error_charts()));
         }
-        blocks.extend(self.drift.as_ref().map(drift_table).map(Block::Table));
+        if let Some(drift) = &self.drift {
+            blocks.push(Block::Table(drift_table(drift)));
+            blocks.push(Block::Text(drift.basis.clone()));
+        }
         Section::new("path", "Path", blocks)
     }
 
     fn motion_section(&self) -> Section {
         Section::new("wheels", "Wheels", vec![beside(self.motion_charts())])
             .with_lead("Shaded stretches are gaps: no motion is invented there.")
+    }
+
+    fn note_section(&self) -> Option<Section> {
+        let blocks = vec![Block::List(self.notes.clone())];
+        (!self.notes.is_empty()).then(|| Section::new("notes", "To be known", blocks))
     }
 
     fn model_section(&self) -> Section {
@@ -144,17 +154,17 @@ fn percent(value: f64) -> String {
 
 fn per_metre(radians: f64) -> String {
     let degrees = kerbside_geometry::angle::degrees(radians);
-    format::with_unit(&format::signed(degrees, 3), "deg/m")
+    format::with_unit(&format::fixed(degrees, 3), "deg/m")
 }
 
 fn drift_table(drift: &Drift) -> Table {
     let end = &drift.end_error;
     let length = |metres| format::with_unit(&format::signed(metres, 3), "m");
     let columns =
-        ["#of the distance", "#heading per metre", "#end along", "#end across", "#end heading"];
+        ["#of the distance", "#heading per metre", "#end x", "#end y", "#end heading"];
     let row = Row::new([
         percent(drift.position_percent),
-        format::optional(drift.heading_per_metre, per_metre),
+        per_metre(drift.heading_per_metre),
         length(end.x),
         length(end.y),
         format::degrees(end.yaw),

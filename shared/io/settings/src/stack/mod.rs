@@ -116,7 +116,7 @@ pub struct RealtimeSettings {
     pub priority: u8,
     /// Whether memory is locked.
     pub lock_memory: bool,
-    /// Cores the control path may run on; none: any.
+    /// Cores the control path may run on; none: the last one there is.
     pub cores: Option<Vec<usize>>,
 }
 
@@ -147,19 +147,11 @@ pub struct RecorderSettings {
     pub chunk_size: u32,
     /// Compression of chunks.
     pub compression: Compression,
-    /// Samples that may wait for the disk; more are dropped and counted.
-    pub queue: u32,
 }
 
 impl Default for RecorderSettings {
     fn default() -> Self {
-        Self {
-            enabled: true,
-            folder: None,
-            chunk_size: 262_144,
-            compression: Compression::Lz4,
-            queue: 16_384,
-        }
+        Self { enabled: true, folder: None, chunk_size: 262_144, compression: Compression::Lz4 }
     }
 }
 

@@ -3,6 +3,7 @@
 mod control;
 mod motion;
 mod planning;
+mod replay;
 mod supervision;
 mod vehicle;
 
@@ -15,6 +16,7 @@ pub use planning::{
     MAX_OBSTACLES, MAX_PLAN_POINTS, MAX_VERTICES, Plan, PlanAnswer, PlanRequest, PlanVerdict,
     TrajectoryPoint,
 };
+pub use replay::Uptake;
 pub use supervision::{
     Cause, Heartbeat, MAX_ROWS, Mode, OperatorAnswer, OperatorRequest, ProcessRow, ProcessState,
     State, Verb,

@@ -123,7 +123,7 @@ impl Supervisor {
         }
         let (cause, culprit) = match latch {
             AlterReason::Inhibited => {
-                return self.stop(Why::plain(Cause::Inhibited), actions);
+                return self.stop(self.inhibited(), actions);
             }
             AlterReason::TrackerStop => (Cause::Tracker, Process::Tracker),
             AlterReason::CommandStale => (Cause::Stale, Process::Tracker),
@@ -135,10 +135,23 @@ impl Supervisor {
 
     pub(super) fn inhibit(&mut self, inhibit: &Inhibit, actions: &mut Actions) {
         self.inhibits.note(inhibit);
-        if self.inhibits.in_force(self.now).is_some() {
-            let who = text::as_str(&inhibit.who);
-            let words = line(format_args!("inhibited by {who}: {}", text::as_str(&inhibit.why)));
-            self.stop(Why { cause: Cause::Inhibited, culprit: None, text: words }, actions);
+        if self.inhibits.in_force(self.now).is_none() {
+            return;
         }
+        if self.mode == Mode::Stopping && self.why.cause == Cause::Inhibited {
+            // The gate was faster with the fact than the inhibit with its reason.
+            self.why = self.inhibited();
+        }
+        self.stop(self.inhibited(), actions);
+    }
+
+    /// Who inhibits motion, and why, as far as that is known.
+    fn inhibited(&self) -> Why {
+        let Some(inhibit) = self.inhibits.in_force(self.now) else {
+            return Why::plain(Cause::Inhibited);
+        };
+        let (who, why) = (text::as_str(&inhibit.who), text::as_str(&inhibit.why));
+        let text = line(format_args!("inhibited by {who}: {why}"));
+        Why { cause: Cause::Inhibited, culprit: None, text }
     }
 }

@@ -63,7 +63,7 @@ fn declare_realtime(schema: Schema<StackDraft>) -> Schema<StackDraft> {
         .optional(
             "realtime.cores",
             Kind::List { of: &CORE, least: 1, most: 1024 },
-            "any core",
+            "the last core",
             "Cores that the control path runs on; a single one has the shorter tail.",
             |s| &mut s.realtime.cores,
         )
@@ -93,12 +93,6 @@ fn declare_recorder(schema: Schema<StackDraft>) -> Schema<StackDraft> {
             Kind::Choice(Compression::NAMES),
             "Compression of chunks.",
             |s| &mut s.recorder.compression,
-        )
-        .key(
-            "recorder.queue",
-            Kind::Integer { unit: "samples", low: 16, high: 1_000_000 },
-            "Samples that may wait for the disk; more are dropped and counted.",
-            |s| &mut s.recorder.queue,
         )
 }
 

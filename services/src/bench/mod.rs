@@ -1,0 +1,56 @@
+//! `bench`: what a hop, the pipeline and a start cost on this machine, held against limits.
+
+mod chain;
+mod hop;
+mod peer;
+mod pipeline;
+mod rows;
+mod start;
+mod statistics;
+mod transport;
+
+use std::os::unix::process::CommandExt;
+use std::process::Command;
+
+use crate::exit::{Exit, Failure};
+
+/// What to measure.
+#[derive(Clone, Debug, clap::Subcommand)]
+pub enum BenchVerb {
+    /// One hop against the middleware alone and a Unix socket, and the ways to wait.
+    #[command(after_help = "Example: kerbside bench transport --blocks 24 --json")]
+    Transport(transport::TransportArgs),
+    /// From encoder reading to command in a stack that drives, and its work against bare hops.
+    #[command(after_help = "Example: kerbside bench pipeline garage --seconds 16")]
+    Pipeline(pipeline::PipelineArgs),
+    /// A whole stack from nothing to READY.
+    #[command(after_help = "Example: kerbside bench start --repeats 10")]
+    Start(start::StartArgs),
+    /// The other process of `transport`.
+    #[command(hide = true)]
+    Peer(peer::PeerArgs),
+    /// A process of the bare chain of `pipeline`.
+    #[command(hide = true)]
+    Link(chain::LinkArgs),
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`] where the measurement cannot be set up.
+pub fn run(verb: &BenchVerb) -> Result<Exit, Failure> {
+    match verb {
+        BenchVerb::Transport(args) => transport::run(args),
+        BenchVerb::Pipeline(args) => pipeline::run(args),
+        BenchVerb::Start(args) => start::run(args),
+        BenchVerb::Peer(args) => peer::run(args),
+        BenchVerb::Link(args) => chain::run_link(args),
+    }
+}
+
+/// A command that runs this very executable.
+fn own_executable() -> Command {
+    let mut command = Command::new("/proc/self/exe");
+    command.arg0("kerbside");
+    command
+}

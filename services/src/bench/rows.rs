@@ -1,0 +1,153 @@
+//! What a bench says: rows of ours against a rival, as a table or as JSON.
+
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{CellAlignment, Table};
+use serde_json::{Value, json};
+
+use super::statistics::{Blocks, Estimate};
+use crate::exit::Exit;
+use crate::figures::Figure;
+
+/// Ours beside a rival.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// What was measured.
+    pub name: String,
+    /// Bytes of the payload.
+    pub bytes: usize,
+    /// Ours: p50 and p99 \[us\].
+    pub ours: (f64, f64),
+    /// The rival's name.
+    pub rival: String,
+    /// The rival: p50 and p99 \[us\].
+    pub rivals: (f64, f64),
+    /// Ours over the rival's, p50.
+    pub ratio: Estimate,
+}
+
+impl Row {
+    /// A row of latencies.
+    #[must_use]
+    pub fn of(name: &str, bytes: usize, ours: &Blocks, rival: &str, rivals: &Blocks) -> Self {
+        let both = |blocks: &Blocks| (blocks.percentile(0.5), blocks.percentile(0.99));
+        Self {
+            name: name.to_owned(),
+            bytes,
+            ours: both(ours),
+            rival: rival.to_owned(),
+            rivals: both(rivals),
+            ratio: ours.ratio(rivals),
+        }
+    }
+
+    /// Ours over the rival's at p99, all blocks together.
+    #[must_use]
+    pub fn ratio_p99(&self) -> f64 {
+        self.ours.1 / self.rivals.1
+    }
+
+    /// The figures of a row that is held against a limit at p50 and, where there is one, at p99.
+    #[must_use]
+    pub fn figures(&self, limit: f64, limit_p99: Option<f64>) -> Vec<Figure> {
+        let name = |percentile: &str| format!("{} against {}, {percentile}", self.name, self.rival);
+        let Estimate { value, low, high } = self.ratio;
+        let p50 = Figure::at_most(&name("p50"), value, limit).within(low, high);
+        let p99 = limit_p99.map(|limit| Figure::at_most(&name("p99"), self.ratio_p99(), limit));
+        core::iter::once(p50).chain(p99).collect()
+    }
+
+    fn as_json(&self) -> Value {
+        let Estimate { value, low, high } = self.ratio;
+        json!({
+            "name": self.name, "bytes": self.bytes,
+            "ours_us": self.ours.0, "ours_p99_us": self.ours.1,
+            "rival": self.rival, "rival_us": self.rivals.0, "rival_p99_us": self.rivals.1,
+            "ratio_p50": { "value": value, "low": low, "high": high }, "ratio_p99": self.ratio_p99(),
+        })
+    }
+}
+
+/// Everything a bench says.
+#[derive(Debug)]
+pub struct Told {
+    /// Which bench.
+    pub verb: &'static str,
+    /// Its rows.
+    pub rows: Vec<Row>,
+    /// What it is held against.
+    pub figures: Vec<Figure>,
+    /// Sentences for people.
+    pub notes: Vec<String>,
+    /// Keys of its own in the JSON object.
+    pub more: Value,
+}
+
+/// Tells, and judges.
+pub fn tell(told: &Told, as_json: bool) -> Exit {
+    let passed = told.figures.iter().all(Figure::passed);
+    if as_json {
+        println!("{}", object(told, passed));
+    } else {
+        print(told);
+    }
+    if passed { Exit::Good } else { Exit::Bad }
+}
+
+fn object(told: &Told, passed: bool) -> Value {
+    let mut object = json!({
+        "schema": format!("kerbside.bench.{}.v1", told.verb), "version": env!("CARGO_PKG_VERSION"), "seed": null,
+        "passed": passed, "figures": told.figures.iter().map(Figure::as_json).collect::<Vec<_>>(),
+        "rows": told.rows.iter().map(Row::as_json).collect::<Vec<_>>(), "notes": told.notes,
+        "machine": crate::machine::facts().into_iter().map(|(name, value)| (name, json!(value)))
+            .collect::<serde_json::Map<_, _>>(),
+    });
+    if let (Some(object), Some(more)) = (object.as_object_mut(), told.more.as_object()) {
+        object.extend(more.clone());
+    }
+    object
+}
+
+fn print(told: &Told) {
+    if !told.rows.is_empty() {
+        println!("{}", table(&told.rows));
+    }
+    told.notes.iter().for_each(|note| println!("{note}"));
+    told.figures.iter().for_each(|figure| println!("{figure}"));
+}
+
+fn table(rows: &[Row]) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    table.set_header([
+        "",
+        "bytes",
+        "p50 us",
+        "p99 us",
+        "against",
+        "p50 us",
+        "p99 us",
+        "ratio p50",
+        "95 %",
+        "ratio p99",
+    ]);
+    for row in rows {
+        table.add_row([
+            row.name.clone(),
+            row.bytes.to_string(),
+            format!("{:.2}", row.ours.0),
+            format!("{:.2}", row.ours.1),
+            row.rival.clone(),
+            format!("{:.2}", row.rivals.0),
+            format!("{:.2}", row.rivals.1),
+            format!("{:.3}", row.ratio.value),
+            format!("{:.3} to {:.3}", row.ratio.low, row.ratio.high),
+            format!("{:.3}", row.ratio_p99()),
+        ]);
+    }
+    for index in [1, 2, 3, 5, 6, 7, 9] {
+        if let Some(column) = table.column_mut(index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}

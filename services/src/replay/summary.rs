@@ -1,0 +1,235 @@
+//! What `replay` says at the end: a table for people, or one JSON object.
+
+use std::path::Path;
+
+use comfy_table::presets::UTF8_FULL_CONDENSED;
+use comfy_table::{Cell, Table};
+use kerbside_geometry::angle;
+use kerbside_messages::EstimatorState;
+use serde_json::{Map, Value, json};
+
+use super::report::model_of;
+use super::{Finished, Outcome, ReplayArgs, sensing};
+use crate::exit::Exit;
+
+/// Tells what came of one drive.
+pub fn tell_one(args: &ReplayArgs, one: &Finished) -> Exit {
+    let passed = one.problem.is_none();
+    if args.json {
+        println!("{}", with_common(one_as_json(one), passed));
+    } else {
+        print_one(one);
+    }
+    if passed { Exit::Good } else { Exit::Bad }
+}
+
+/// Tells what came of `wanted` drives.
+pub fn tell_many(args: &ReplayArgs, folder: &Path, outcomes: &[Outcome], wanted: usize) -> Exit {
+    let exit = outcomes.iter().map(exit_of).find(|exit| *exit != Exit::Good);
+    let exit = exit.unwrap_or(if outcomes.len() == wanted { Exit::Good } else { Exit::Bad });
+    if args.json {
+        let runs: Vec<_> = outcomes.iter().map(outcome_as_json).collect();
+        let object = json!({ "input": args.path, "runs": runs });
+        println!("{}", with_common(object, exit == Exit::Good));
+    } else {
+        print_many(folder, outcomes);
+    }
+    exit
+}
+
+fn exit_of(outcome: &Outcome) -> Exit {
+    match &outcome.result {
+        Ok(one) if one.problem.is_none() => Exit::Good,
+        Ok(_) => Exit::Bad,
+        Err(failure) => failure.exit,
+    }
+}
+
+fn with_common(mut object: Value, passed: bool) -> Value {
+    object["schema"] = json!("kerbside.replay.v1");
+    object["version"] = json!(env!("CARGO_PKG_VERSION"));
+    object["seed"] = Value::Null;
+    object["passed"] = json!(passed);
+    object["figures"] = json!([]);
+    object
+}
+
+fn outcome_as_json(outcome: &Outcome) -> Value {
+    match &outcome.result {
+        Ok(one) => one_as_json(one),
+        Err(failure) => json!({ "input": outcome.input, "refused": failure.report.to_string() }),
+    }
+}
+
+fn one_as_json(one: &Finished) -> Value {
+    let drift = one.comparison.drift.as_ref().ok().map(|drift| {
+        let end = drift.end_error;
+        json!({
+            "position_percent": drift.position_percent,
+            "position_percent_max": drift.position_percent_max,
+            "heading_rad_per_m": drift.heading_rad_per_m,
+            "heading_bias_rad_per_m": drift.heading_bias_rad_per_m,
+            "end_error": { "x": end.x, "y": end.y, "yaw": end.yaw },
+            "window_m": drift.window,
+            "windows": drift.windows,
+        })
+    });
+    let refused: Map<_, _> =
+        one.refusals.iter().map(|(reason, count)| ((*reason).to_owned(), json!(count))).collect();
+    let newest = one.track.newest.unwrap_or_default();
+    let live = one.speeds.live.is_some();
+    json!({
+        "input": one.job.input.drive.path(),
+        "name": one.job.input.drive.name(),
+        "vehicle": one.job.service.vehicle.name,
+        "mode": if live { "live" } else { "pure" },
+        "speed": one.job.service.args.speed,
+        "model": model_of(one).name(),
+        "state": state_of(one),
+        "duration_s": one.duration,
+        "distance_m": one.track.distance(),
+        "samples": one.job.input.raws.len(),
+        "odometry_samples": one.track.len(),
+        "gaps": one.track.gaps.len(),
+        "refused": refused,
+        "corrections": newest.corrections,
+        "gated": newest.gated,
+        "unusable": newest.unusable,
+        "speed_factor": one.speed_factor(),
+        "speed_factor_files": one.speeds.files,
+        "speed_factor_memory": one.speeds.memory,
+        "odometry_sha256": one.hash,
+        "drift": drift,
+        "cause": one.problem.clone().unwrap_or_default(),
+        "notes": one.notes,
+        "instance": live.then(|| one.job.service.instance.name()),
+        "recording": one.recording,
+        "report": one.report,
+    })
+}
+
+fn state_of(one: &Finished) -> &'static str {
+    let code = one.track.newest.map(|odometry| odometry.state);
+    code.and_then(EstimatorState::from_code).map_or("no odometry", EstimatorState::name)
+}
+
+fn print_one(one: &Finished) {
+    let name = one.job.input.drive.name();
+    match &one.problem {
+        None => println!("{name}: replayed {}", one.mode_in_words()),
+        Some(problem) => println!("{name}: not replayed: {problem}"),
+    }
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    let mut row = |name: &str, value: String| {
+        table.add_row([Cell::new(name), Cell::new(value)]);
+    };
+    let uses = sensing::uses(model_of(one), &one.job.input.sensors).join(", ");
+    row("odometry model", format!("{} ({uses})", model_of(one)));
+    row("distance", format!("{:.2} m in {:.1} s", one.track.distance(), one.duration));
+    row("readings", format!("{}, {} gaps", one.job.input.raws.len(), one.track.gaps.len()));
+    if !one.refusals.is_empty() {
+        row("refused", refusals_in_words(one));
+    }
+    if let Ok(drift) = &one.comparison.drift {
+        let percent = (drift.position_percent, drift.position_percent_max);
+        row("position drift", format!("{:.2} % of distance, at most {:.2} %", percent.0, percent.1));
+        row("heading drift", format!("{} rad/m", significant(drift.heading_rad_per_m)));
+        row("windows", format!("{} of {:.2} m", drift.windows, drift.window));
+        row("end error", end_in_words(one));
+    }
+    let newest = one.track.newest.unwrap_or_default();
+    if newest.corrections + newest.gated > 0 {
+        row("corrections", format!("{} taken, {} refused by the gate", newest.corrections, newest.gated));
+    }
+    row("pose", state_of(one).to_owned());
+    row("speed", speeds_in_words(one));
+    println!("{table}");
+    one.notes.iter().for_each(|note| println!("note       {note}"));
+    println!("sha-256    {}", one.hash);
+    println!("report     {}", one.report.display());
+    if let Some(recording) = &one.recording {
+        println!("recording  {}", recording.display());
+    }
+    println!("repeat     {}", one.job.command_line);
+}
+
+fn refusals_in_words(one: &Finished) -> String {
+    let words = one.refusals.iter().map(|(reason, count)| format!("{count} ({reason})"));
+    words.collect::<Vec<_>>().join(", ")
+}
+
+fn end_in_words(one: &Finished) -> String {
+    one.comparison.drift.as_ref().map_or("-".to_owned(), |drift| {
+        let end = drift.end_error;
+        format!("x {:+.3} m, y {:+.3} m, yaw {:+.2}°", end.x, end.y, angle::degrees(end.yaw))
+    })
+}
+
+fn speeds_in_words(one: &Finished) -> String {
+    let pure = format!(
+        "{:.0} x real time from files to hash, {:.0} x in memory, stages alone",
+        one.speeds.files, one.speeds.memory
+    );
+    match one.speeds.live {
+        Some(live) => format!("{live:.1} x real time through processes"),
+        None => pure,
+    }
+}
+
+/// Three significant digits.
+fn significant(value: f64) -> String {
+    let digits = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped
+    let decimals = (2.0 - digits).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+fn print_many(folder: &Path, outcomes: &[Outcome]) {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    table.set_header(["run", "model", "m", "gaps", "drift %", "rad/m", "end error", "x real time"]);
+    for outcome in outcomes {
+        table.add_row(row_of(outcome));
+    }
+    println!("{table}");
+    for outcome in outcomes {
+        if let Ok(one) = &outcome.result {
+            let name = one.job.input.drive.name();
+            one.problem.iter().for_each(|problem| println!("{name}: not replayed: {problem}"));
+            one.notes.iter().for_each(|note| println!("{name}: {note}"));
+        }
+    }
+    println!("reports    {}", folder.display());
+}
+
+fn row_of(outcome: &Outcome) -> Vec<String> {
+    let name = outcome.input.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let one = match &outcome.result {
+        Ok(one) => one,
+        Err(failure) => return vec![name, format!("refused: {}", failure.report)],
+    };
+    let drift = one.comparison.drift.as_ref().ok();
+    let known = |value: Option<String>| value.unwrap_or_else(|| "-".to_owned());
+    vec![
+        name,
+        model_of(one).name().to_owned(),
+        format!("{:.1}", one.track.distance()),
+        one.track.gaps.len().to_string(),
+        known(drift.map(|drift| format!("{:.2}", drift.position_percent))),
+        known(drift.map(|drift| significant(drift.heading_rad_per_m))),
+        end_in_words(one),
+        format!("{:.0}", one.speed_factor()),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::significant;
+
+    #[test]
+    fn figures_have_three_digits() {
+        let shown = [0.0123456, 1.23456, 0.000_012_345_6, 123.456, 0.0].map(significant);
+        assert_eq!(shown, ["0.0123", "1.23", "0.0000123", "123", "0.00"]);
+    }
+}

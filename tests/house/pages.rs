@@ -1,0 +1,175 @@
+//! The pages say what the code does: the table of topics, the reference of configuration keys, every command and
+//! every link.
+//!
+//! With `KERBSIDE_WRITE_PAGES=1` in the environment the generated parts are written anew instead of compared.
+
+use std::fs;
+use std::path::Path;
+
+use clap::Parser;
+use kerbside_messages::topics::{Delivery, Publisher, TABLE, Topic};
+
+use crate::{assert_none, root};
+
+/// Pages for people.
+const PAGES: [&str; 5] = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "deploy/README.md",
+    "deploy/examples/microcontroller/README.md",
+];
+
+const TABLE_BEGIN: &str =
+    "<!-- topics: written by `KERBSIDE_WRITE_PAGES=1 cargo test --test house` -->\n";
+const TABLE_END: &str = "<!-- end of topics -->";
+
+fn read(page: &str) -> String {
+    fs::read_to_string(root().join(page)).unwrap_or_else(|error| panic!("{page}: {error}"))
+}
+
+/// Compares a generated page with the one that is there, or writes it.
+fn hold(page: &str, is: &str, wanted: &str) {
+    if std::env::var_os("KERBSIDE_WRITE_PAGES").is_some() {
+        fs::write(root().join(page), wanted).expect("a writable page");
+    } else {
+        let hint = "KERBSIDE_WRITE_PAGES=1 cargo test -p kerbside --test house writes it anew";
+        assert!(is == wanted, "{page} is not what the code says; {hint}");
+    }
+}
+
+fn publisher(topic: &Topic) -> String {
+    match topic.publisher {
+        Publisher::One(process) => process.name().to_owned(),
+        Publisher::Each => "every process".to_owned(),
+        Publisher::Any => "anyone".to_owned(),
+    }
+}
+
+fn delivery(topic: &Topic) -> String {
+    match topic.delivery {
+        Delivery::InOrder { depth } => format!("in order, {depth} deep"),
+        Delivery::Newest => "newest".to_owned(),
+        Delivery::RequestResponse => "request and answer".to_owned(),
+    }
+}
+
+fn row(topic: &Topic) -> String {
+    // Which subscriber is woken is the second thing one asks of a topic: it stands in bold.
+    let subscriber = |process: &kerbside_messages::Process| match topic.wakes {
+        Some(woken) if woken == *process => format!("**{process}**"),
+        _ => process.to_string(),
+    };
+    let recorder = kerbside_messages::Process::Recorder;
+    let readers = topic.subscribers.iter().filter(|process| **process != recorder);
+    let readers: Vec<_> = readers.map(subscriber).collect();
+    let rate = if topic.rate > 0.0 { format!("{}", topic.rate) } else { String::new() };
+    let fresh = topic.freshness.map_or(String::new(), |age| format!("{}", age.as_millis()));
+    let cells = [
+        format!("`{}`", topic.name),
+        publisher(topic),
+        readers.join(", "),
+        rate,
+        fresh,
+        delivery(topic),
+        topic.doc.to_owned(),
+    ];
+    format!("| {} |\n", cells.join(" | "))
+}
+
+fn table() -> String {
+    let head = "\n| topic | from | to | Hz | fresh for, ms | delivery | what it is |\n|---|---|---|---|---|---|---|\n";
+    format!("{head}{}\n", TABLE.iter().map(row).collect::<String>())
+}
+
+#[test]
+fn the_table_of_topics_is_the_codes() {
+    let page = read("README.md");
+    let begin = page.find(TABLE_BEGIN).expect("the beginning of the table") + TABLE_BEGIN.len();
+    let end = page.find(TABLE_END).expect("the end of the table");
+    let wanted = format!("{}{}{}", &page[..begin], table(), &page[end..]);
+    hold("README.md", &page, &wanted);
+}
+
+#[test]
+fn the_reference_of_keys_is_the_codes() {
+    let page = "docs/configuration.md";
+    let is = fs::read_to_string(root().join(page)).unwrap_or_default();
+    hold(page, &is, &kerbside_settings::reference());
+}
+
+/// The commands in a page's blocks of code: lines that call kerbside, without what a shell would take away.
+fn commands(text: &str) -> Vec<String> {
+    let mut inside = false;
+    let mut found = Vec::new();
+    for line in text.lines() {
+        if line.starts_with("```") {
+            inside = !inside;
+            continue;
+        }
+        let line = line.split(['#', '|', '>', '&']).next().unwrap_or_default().trim();
+        let line = line.strip_prefix("$ ").unwrap_or(line);
+        let called = line
+            .strip_prefix("cargo run --release -- ")
+            .or_else(|| line.strip_prefix("kerbside "))
+            .or_else(|| line.strip_prefix("target/release/kerbside "));
+        if let Some(arguments) = called.filter(|_| inside) {
+            found.push(arguments.to_owned());
+        }
+    }
+    found
+}
+
+#[test]
+fn commands_in_pages_are_understood() {
+    let mut complaints = Vec::new();
+    let mut count = 0;
+    for page in PAGES {
+        for command in commands(&read(page)) {
+            count += 1;
+            let words = core::iter::once("kerbside").chain(command.split_whitespace());
+            if let Err(error) = kerbside::Cli::try_parse_from(words)
+                && error.use_stderr()
+            {
+                let said = error.to_string();
+                let first = said.lines().next().unwrap_or_default().to_owned();
+                complaints.push(format!("{page}: kerbside {command}: {first}"));
+            }
+        }
+    }
+    assert!(count > 10, "{count} commands: this test looks at nothing");
+    assert_none(&complaints);
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let mut complaints = Vec::new();
+    for page in PAGES {
+        let text = read(page);
+        let folder = Path::new(page).parent().expect("a folder").to_owned();
+        for (at, _) in text.match_indices("](") {
+            let target = text[at + 2..].split(')').next().unwrap_or_default();
+            let file = target.split('#').next().unwrap_or_default();
+            let elsewhere = target.contains("://") || file.is_empty();
+            if !elsewhere && !root().join(&folder).join(file).exists() {
+                complaints.push(format!("{page}: {target} is not there"));
+            }
+        }
+    }
+    assert_none(&complaints);
+}
+
+#[test]
+fn verbs_of_the_command_line_are_told_of() {
+    use clap::CommandFactory;
+    let readme = read("README.md");
+    let untold: Vec<_> = kerbside::Cli::command()
+        .get_subcommands()
+        .map(|verb| verb.get_name().to_owned())
+        .filter(|verb| {
+            !readme.contains(&format!("kerbside {verb}")) && !readme.contains(&format!("-- {verb}"))
+        })
+        .map(|verb| format!("README.md says nothing of kerbside {verb}"))
+        .collect();
+    assert_none(&untold);
+}
