@@ -1,9 +1,13 @@
 //! A process is killed or stopped while the vehicle does not drive: the stack comes back, and arms as it should.
 
+// The helpers of a test unwrap as its functions do.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod common;
 
+use common::disturbance::end_if_stalled;
 use common::stack::Verb;
-use common::{Sandbox, Signal, Stack};
+use common::{Sandbox, Signal, Stack, undisturbed};
 use kerbside_messages::{Mode, Nanos, Process};
 
 /// The shortest whole manoeuvre, and where it starts.
@@ -28,6 +32,7 @@ fn fault(stack: &Stack, process: Process, signal: Signal) -> Nanos {
     let whole = stack.until_recovered(Mode::Faulted, at);
     let state = stack.seen().state().cloned().unwrap();
     assert_ne!(state.row(process).pid, pid, "{state:#?}");
+    end_if_stalled(&format!("{}: {}", state.cause, state.words), Some(process));
     assert!(state.words.contains(process.name()), "{state:#?}");
     println!("{process} {signal:?}: {:.3} s", kerbside_messages::seconds(whole - at));
     whole
@@ -46,9 +51,8 @@ fn come_back_in_every_mode(signal: Signal) {
     fault(&stack, Process::Ingest, signal); // in armed
     let moved = stack.seen().distance();
     assert!(moved < 1e-3, "{moved} m before the first plan");
-    let go = stack.begin(&["go", NEAR]);
-    stack.until_mode(Mode::Driving);
-    stack.until_rolled(0.05);
+    let go = stack.go(NEAR);
+    stack.until_driving(0.05);
     let stop = stack.begin(&["stop"]);
     stack.until_mode(Mode::Stopping);
     fault(&stack, Process::Tracker, signal); // in stopping
@@ -73,12 +77,12 @@ fn come_back_in_every_mode(signal: Signal) {
 
 #[test]
 fn killed_processes_come_back_in_every_mode() {
-    come_back_in_every_mode(Signal::KILL);
+    undisturbed(|| come_back_in_every_mode(Signal::KILL));
 }
 
 #[test]
 fn stopped_processes_come_back_in_every_mode() {
-    come_back_in_every_mode(Signal::STOP);
+    undisturbed(|| come_back_in_every_mode(Signal::STOP));
 }
 
 /// A stack whose recorder somebody else starts: until then it is starting.

@@ -1,8 +1,9 @@
 //! Actuation: the gate between command and vehicle.
 //!
 //! Topics in: `command`, `permit`, `inhibit`. Topics out: `actuator`, on each command and at least every period
-//! without one: a stop ramp needs nobody's sample. Where commands come, a tick whose output is the last one's is not
-//! published: a third of the wake-ups of gate and interface would say nothing new (`kerbside bench pipeline`).
+//! without one: a stop ramp needs nobody's sample. Each command puts off the tick, and a tick between commands whose
+//! output is the last one's is not published: as many wake-ups of gate and interface would say nothing new
+//! (`kerbside bench pipeline`).
 //!
 //! It waits by polling its event's descriptor: a tick has to be kept to a tenth of a millisecond, and the bound of a
 //! wait on the event itself is rounded up to the kernel's ticks, 5 ms to 12. What a poll costs more than such a wait
@@ -44,6 +45,9 @@ pub fn run(service: &Service) -> Result<Exit, Failure> {
         let fresh = command.update();
         if !tick.due(woken) && !fresh && !inhibited {
             continue;
+        }
+        if fresh {
+            tick.restart(woken);
         }
         let arrival =
             command.get().filter(|_| fresh).map_or(woken, |command| command.header.origin);

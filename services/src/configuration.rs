@@ -36,7 +36,10 @@ pub fn parking(
 ) -> Result<Parking, Failure> {
     let parking = sources(config)?.parking(scenario, vehicle)?;
     warn(&parking.scenario.warnings);
-    warn(&parking.stack.warnings);
+    // Both are checked with the vehicle, and say the same of it.
+    let news = |warning: &&Problem| !parking.scenario.warnings.contains(warning);
+    let of_stack: Vec<_> = parking.stack.warnings.iter().filter(news).cloned().collect();
+    warn(&of_stack);
     Ok(parking)
 }
 
@@ -75,14 +78,22 @@ impl Refused {
     }
 }
 
-impl Diagnostic for Refused {
-    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        Some(Box::new(self.problems.iter().map(|problem| problem as &dyn Diagnostic)))
+impl Refused {
+    /// Each problem in one line.
+    pub fn lines(&self) -> impl Iterator<Item = String> {
+        self.problems.iter().map(ToString::to_string)
+    }
+
+    /// Each problem with the text it stands in.
+    pub fn reports(&self) -> impl Iterator<Item = miette::Report> {
+        self.problems.iter().cloned().map(miette::Report::new)
     }
 }
 
+impl Diagnostic for Refused {}
+
 /// A problem with the text it stands in.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 #[error("{}:{}: {}", problem.file, problem.line, problem.message())]
 struct Located {
     problem: Problem,

@@ -3,6 +3,8 @@
 use std::io::Write;
 use std::process::ExitCode;
 
+use crate::configuration::Refused;
+
 /// Exit codes; the same for every verb.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -57,9 +59,9 @@ impl Failure {
     #[must_use]
     pub fn tell(&self, json: bool) -> Exit {
         let report = &self.report;
+        let refused = report.downcast_ref::<Refused>();
         if json {
-            let problems: Vec<_> =
-                report.related().into_iter().flatten().map(ToString::to_string).collect();
+            let problems: Vec<_> = refused.iter().flat_map(|refused| refused.lines()).collect();
             println!(
                 "{}",
                 serde_json::json!({
@@ -69,8 +71,12 @@ impl Failure {
                 })
             );
         }
+        let mut text = format!("{report:?}");
+        for report in refused.iter().flat_map(|refused| refused.reports()) {
+            text.push_str(&format!("\n{report:?}"));
+        }
         // Nobody may read it any more; the exit code tells too.
-        let _ = writeln!(std::io::stderr(), "{report:?}");
+        let _ = writeln!(std::io::stderr(), "{text}");
         self.exit
     }
 

@@ -1,5 +1,8 @@
 //! kerbside: parks a car-like vehicle from its own wheel encoders, as real-time processes on shared memory.
 
+// The library is the executable's own, and is there for its tests: `pub` means the house, not the world.
+#![allow(unreachable_pub)]
+
 pub mod actuation;
 pub mod bench;
 pub mod children;

@@ -33,6 +33,8 @@ pub struct Life {
     exit: Exit,
     in_step: bool,
     replays: bool,
+    external: bool,
+    failed: Option<Nanos>,
     _lock: FileLock,
 }
 
@@ -66,6 +68,8 @@ impl Life {
             exit: Exit::Good,
             in_step: false,
             replays: service.replays(),
+            external: service.is_external(process),
+            failed: None,
             _lock: lock,
         })
     }
@@ -132,6 +136,13 @@ impl Life {
             return false;
         }
         self.beat(now);
+        let window = nanos(self.safety.timeouts.heartbeat_window);
+        if self.external && self.failed.is_some_and(|failed| now.saturating_sub(failed) > window) {
+            // Nobody else ends it, and whoever started it learns that it has to be started again.
+            tracing::error!("own check failed: ending");
+            self.exit = Exit::Internal;
+            return false;
+        }
         true
     }
 
@@ -199,6 +210,7 @@ impl Life {
     /// The process failed its own check: one more heartbeat says why, then it falls silent.
     pub fn fail(&mut self, why: &str) {
         self.monitor.fail(why);
+        self.failed.get_or_insert(now());
     }
 
     /// How the process ends.
@@ -357,13 +369,16 @@ pub fn run_with_worker<P>(
             .map_err(Failure::internal)?
     };
     let window = nanos(life.timeouts().slow_window);
-    let (mut seen, mut since) = (0, now());
+    let (mut seen, mut since, mut looked) = (0, now(), now());
     let mut tick = Ticker::new(life.timeouts().heartbeat);
     while life.goes_on() && !thread.is_finished() {
         let progress = worker.progress.load(Ordering::Relaxed);
-        if progress != seen {
-            (seen, since) = (progress, now());
-        } else if now().saturating_sub(since) > window {
+        // A process that was stopped as a whole is given its time again.
+        let was_stopped = now().saturating_sub(looked) > window / 2;
+        looked = now();
+        if progress != seen || was_stopped {
+            (seen, since) = (progress, looked);
+        } else if looked.saturating_sub(since) > window {
             life.fail("the work makes no progress");
         }
         let text = worker.text.lock().map(|text| text.clone()).unwrap_or_default();

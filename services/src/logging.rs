@@ -38,7 +38,11 @@ fn to<W: for<'a> MakeWriter<'a> + 'static>(writer: W, level: &str) -> Builder<W>
     let filter = EnvFilter::try_from_default_env()
         .or_else(|_| EnvFilter::try_new(level))
         .unwrap_or_else(|_| EnvFilter::new("info"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(writer)
+    // An error of writing would be told by a panic. A car does not stop because nobody reads its log.
+    tracing_subscriber::fmt()
+        .log_internal_errors(false)
+        .with_env_filter(filter)
+        .with_writer(writer)
 }
 
 /// Writes the monotonic time, which all processes share, and the process's name.

@@ -366,7 +366,11 @@ impl Manoeuvre {
         let valid = |odometry: &Odometry| odometry.state == EstimatorState::Valid.code();
         let whole = state.healthy == 1 && seen.odometry.is_some_and(valid);
         let over = now.saturating_sub(self.since) > span(RECOVERY);
-        if whole || over || state.mode() == Mode::Ready { Act::End(End::Stopped(cause)) } else { Act::Watch }
+        if whole || over || state.mode() == Mode::Ready {
+            Act::End(End::Stopped(cause))
+        } else {
+            Act::Watch
+        }
     }
 
     fn answer_is_late(&self, now: Nanos) -> bool {

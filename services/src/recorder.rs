@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use kerbside_messages::{
-    Actuator, Command, Fix, Header, Heartbeat, Inhibit, Message, Odometry, Permit, Process, Raw, Restore,
-    State, Travel, Truth,
+    Actuator, Command, Fix, Header, Heartbeat, Inhibit, Message, Odometry, Permit, Process, Raw,
+    Restore, State, Travel, Truth,
 };
 use kerbside_recordings::recording::{Chunks, Provenance, RecordingWriter, WriteError};
 use kerbside_runtime::{PlanSubscriber, Session, SessionError, Subscriber, Ticker, depth, now};
@@ -62,7 +62,7 @@ impl Recorder {
         let taken = Rc::new(Cell::new(0));
         let newest = Rc::clone(&taken);
         let mut feeds = vec![
-            feed::<Raw>(session, None)?,
+            raw_feed(session, service)?,
             feed::<Travel>(session, None)?,
             feed_seen::<Odometry>(session, None, move |header| newest.set(header.sequence))?,
             feed::<Restore>(session, None)?,
@@ -233,6 +233,13 @@ fn feed_seen<M: Message>(
         }
         Ok(gaps.lost)
     }))
+}
+
+/// Readings; what of a replay's sequence is missing was lost long ago, and is no loss of this recorder.
+fn raw_feed(session: &Session, service: &Service) -> Result<Feed, SessionError> {
+    let mut raw = feed::<Raw>(session, None)?;
+    let counts = u64::from(!service.replays());
+    Ok(Box::new(move |writer| Ok(counts * raw(writer)?)))
 }
 
 fn plan_feed(session: &Session) -> Result<Feed, SessionError> {

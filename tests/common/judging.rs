@@ -8,17 +8,17 @@ use super::Seen;
 /// Speed below which the vehicle stands \[m/s\].
 const REST: f64 = 1e-3;
 /// Speed below which it only rolls out: what is left is its lag's exponential tail \[m/s\].
-pub const ROLLING_OUT: f64 = 1e-2;
+pub(crate) const ROLLING_OUT: f64 = 1e-2;
 
 /// How the vehicle stopped after a fault.
 #[derive(Clone, Copy, Debug)]
-pub struct Halt {
+pub(crate) struct Halt {
     /// The fastest from the fault on \[m/s\].
-    pub speed: f64,
+    pub(crate) speed: f64,
     /// Rolled after it \[m\].
-    pub distance: f64,
+    pub(crate) distance: f64,
     /// Time until it stood \[s\].
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 impl Halt {
@@ -26,7 +26,7 @@ impl Halt {
     ///
     /// # Panics
     /// Where it was not seen, or did not drive.
-    pub fn after(seen: &Seen, at: Nanos) -> Self {
+    pub(crate) fn after(seen: &Seen, at: Nanos) -> Self {
         let before = seen.truth.iter().rev().find(|truth| truth.stamp <= at).unwrap();
         assert!(before.speed.abs() > 0.05, "the vehicle does not drive: {before:?}");
         let last = seen.truth.last().unwrap();
@@ -42,7 +42,7 @@ impl Halt {
     ///
     /// # Panics
     /// Where it rolled farther or longer.
-    pub fn assert_in_time(&self, what: &str) {
+    pub(crate) fn assert_in_time(&self, what: &str) {
         let mut stack = kerbside::configuration::stack(None, None).unwrap();
         stack.vehicle.limits.speed = self.speed;
         let distance = bounds::stop_distance(&stack.vehicle, stack.safety(false));
@@ -62,7 +62,7 @@ impl Halt {
 ///
 /// # Panics
 /// Where there is no valid estimate.
-pub fn pose_jump(seen: &Seen, at: Nanos) -> f64 {
+pub(crate) fn pose_jump(seen: &Seen, at: Nanos) -> f64 {
     let before = error_at(seen, |stamp| stamp <= at);
     let after = error_at(seen, |stamp| stamp > at);
     (after.0 - before.0).hypot(after.1 - before.1)

@@ -5,13 +5,22 @@
 //! against having left a process, a segment or a folder behind.
 
 // A test that cannot go on panics: that is how it says so. No test binary uses everything.
-#![allow(dead_code, unused_imports, unreachable_pub, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(
+    dead_code,
+    unused_imports,
+    unreachable_pub,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic
+)]
 
-pub mod judging;
-pub mod observer;
-pub mod sandbox;
-pub mod stack;
+pub(crate) mod disturbance;
+pub(crate) mod judging;
+pub(crate) mod observer;
+pub(crate) mod sandbox;
+pub(crate) mod stack;
 
+pub use disturbance::undisturbed;
 pub use observer::{OdometryLine, RowLine, Seen, StateLine, TruthLine};
 pub use sandbox::Sandbox;
 pub use stack::{Outcome, Signal, Stack};
@@ -19,4 +28,4 @@ pub use stack::{Outcome, Signal, Stack};
 use core::time::Duration;
 
 /// Longest wait for anything: a busy machine is slow, but what did not come by then never comes.
-pub const PATIENCE: Duration = Duration::from_secs(30);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(30);

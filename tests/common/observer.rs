@@ -24,63 +24,63 @@ const TEST: &str = "common::observer::observes";
 
 /// The true state.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct TruthLine {
-    pub stamp: Nanos,
-    pub x: f64,
-    pub y: f64,
-    pub yaw: f64,
-    pub speed: f64,
+pub(crate) struct TruthLine {
+    pub(crate) stamp: Nanos,
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) yaw: f64,
+    pub(crate) speed: f64,
     /// Rolled in either direction since the vehicle's start \[m\].
-    pub distance: f64,
+    pub(crate) distance: f64,
     /// The vehicle stops because commands stay away.
-    pub silent: bool,
+    pub(crate) silent: bool,
 }
 
 /// An estimate.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct OdometryLine {
-    pub stamp: Nanos,
+pub(crate) struct OdometryLine {
+    pub(crate) stamp: Nanos,
     /// The estimator's life.
-    pub epoch: u64,
-    pub x: f64,
-    pub y: f64,
-    pub yaw: f64,
-    pub valid: bool,
-    pub standstill: bool,
+    pub(crate) epoch: u64,
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    pub(crate) yaw: f64,
+    pub(crate) valid: bool,
+    pub(crate) standstill: bool,
 }
 
 /// What the gate let pass.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct GateLine {
-    pub sent: Nanos,
-    pub speed: f64,
-    pub latch: String,
+pub(crate) struct GateLine {
+    pub(crate) sent: Nanos,
+    pub(crate) speed: f64,
+    pub(crate) latch: String,
 }
 
 /// The supervisor's state; told when it changes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StateLine {
-    pub sent: Nanos,
-    pub mode: String,
-    pub cause: String,
-    pub words: String,
-    pub arms: u64,
-    pub healthy: bool,
-    pub rows: Vec<RowLine>,
+pub(crate) struct StateLine {
+    pub(crate) sent: Nanos,
+    pub(crate) mode: String,
+    pub(crate) cause: String,
+    pub(crate) words: String,
+    pub(crate) arms: u64,
+    pub(crate) healthy: bool,
+    pub(crate) rows: Vec<RowLine>,
 }
 
 /// A process in the supervisor's state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RowLine {
-    pub name: String,
-    pub pid: u32,
-    pub state: String,
-    pub restarts: u32,
+pub(crate) struct RowLine {
+    pub(crate) name: String,
+    pub(crate) pid: u32,
+    pub(crate) state: String,
+    pub(crate) restarts: u32,
 }
 
 impl StateLine {
     /// The row of a process.
-    pub fn row(&self, process: Process) -> &RowLine {
+    pub(crate) fn row(&self, process: Process) -> &RowLine {
         self.rows.iter().find(|row| row.name == process.name()).unwrap()
     }
 }
@@ -95,26 +95,26 @@ enum Line {
 
 /// Everything seen so far.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
-    pub truth: Vec<TruthLine>,
-    pub odometry: Vec<OdometryLine>,
-    pub gate: Vec<GateLine>,
-    pub states: Vec<StateLine>,
+pub(crate) struct Seen {
+    pub(crate) truth: Vec<TruthLine>,
+    pub(crate) odometry: Vec<OdometryLine>,
+    pub(crate) gate: Vec<GateLine>,
+    pub(crate) states: Vec<StateLine>,
 }
 
 impl Seen {
     /// The newest state.
-    pub fn state(&self) -> Option<&StateLine> {
+    pub(crate) fn state(&self) -> Option<&StateLine> {
         self.states.last()
     }
 
     /// The newest state, if it is in that mode.
-    pub fn in_mode(&self, mode: Mode) -> Option<&StateLine> {
+    pub(crate) fn in_mode(&self, mode: Mode) -> Option<&StateLine> {
         self.state().filter(|state| state.mode == mode.name())
     }
 
     /// Distance rolled \[m\].
-    pub fn distance(&self) -> f64 {
+    pub(crate) fn distance(&self) -> f64 {
         self.truth.last().map_or(0.0, |truth| truth.distance)
     }
 
@@ -130,7 +130,7 @@ impl Seen {
 
 /// The observing process as the test sees it; ended when dropped.
 #[derive(Debug)]
-pub struct Observer {
+pub(crate) struct Observer {
     child: Child,
     stdin: Option<ChildStdin>,
     shared: Arc<(Mutex<Seen>, Condvar)>,
@@ -138,12 +138,16 @@ pub struct Observer {
 
 impl Observer {
     /// Starts to observe the sandbox's instance, which may come up later.
-    pub fn start(sandbox: &Sandbox) -> Self {
+    pub(crate) fn start(sandbox: &Sandbox) -> Self {
         let mut command = sandbox.at_home(Command::new(std::env::current_exe().unwrap()));
         command.args(["--exact", TEST, "--ignored", "--nocapture", "--test-threads=1"]);
         command.env(INSTANCE, sandbox.instance().name());
-        let mut child =
-            command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
         let shared: Arc<(Mutex<Seen>, Condvar)> = Arc::default();
         let (lines, told) = (BufReader::new(child.stdout.take().unwrap()), Arc::clone(&shared));
         std::thread::spawn(move || {
@@ -160,12 +164,12 @@ impl Observer {
     }
 
     /// Everything seen so far.
-    pub fn seen(&self) -> Seen {
+    pub(crate) fn seen(&self) -> Seen {
         lock(&self.shared.0).clone()
     }
 
     /// Waits until `found` finds something; none after `bound`.
-    pub fn wait<T>(&self, bound: Duration, found: impl Fn(&Seen) -> Option<T>) -> Option<T> {
+    pub(crate) fn wait<T>(&self, bound: Duration, found: impl Fn(&Seen) -> Option<T>) -> Option<T> {
         let mut result = None;
         let searching = |seen: &mut Seen| {
             result = found(seen);
@@ -177,7 +181,7 @@ impl Observer {
     }
 
     /// Has it inhibit motion for so long.
-    pub fn inhibit(&mut self, span: Duration) {
+    pub(crate) fn inhibit(&mut self, span: Duration) {
         writeln!(self.stdin.as_ref().unwrap(), "{}", span.as_nanos()).unwrap();
     }
 }
@@ -278,7 +282,9 @@ impl Eyes {
         }
         if self.state.update()
             && let Some(line) = self.state.get().map(state_line)
-            && told.as_ref().is_none_or(|told| StateLine { sent: told.sent, ..line.clone() } != *told)
+            && told
+                .as_ref()
+                .is_none_or(|told| StateLine { sent: told.sent, ..line.clone() } != *told)
         {
             *told = Some(line.clone());
             lines.push(Line::State(line));

@@ -18,14 +18,14 @@ static ENDED: Condvar = Condvar::new();
 
 /// Room for a stack; waits until there is some.
 #[derive(Debug)]
-pub struct Sandbox {
+pub(crate) struct Sandbox {
     folder: Arc<TempDir>,
     name: &'static str,
 }
 
 impl Sandbox {
     /// Takes one of the two places for stacks.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         take_place();
         // Sockets live below it, and their paths have to be short.
         let folder = tempfile::Builder::new().prefix("kb").tempdir_in("/tmp").unwrap();
@@ -36,18 +36,18 @@ impl Sandbox {
     }
 
     /// Takes the other place, for a second instance in the same run-time folder.
-    pub fn beside(&self) -> Self {
+    pub(crate) fn beside(&self) -> Self {
         take_place();
         Self { folder: Arc::clone(&self.folder), name: "two" }
     }
 
     /// The executable, at home here.
-    pub fn kerbside(&self) -> Command {
+    pub(crate) fn kerbside(&self) -> Command {
         self.at_home(Command::new(env!("CARGO_BIN_EXE_kerbside")))
     }
 
     /// `command`, with run-time and state folder here and no configuration in its working directory.
-    pub fn at_home(&self, mut command: Command) -> Command {
+    pub(crate) fn at_home(&self, mut command: Command) -> Command {
         command
             .env(MARK, self.mark())
             .env("XDG_RUNTIME_DIR", self.run_time())
@@ -59,12 +59,12 @@ impl Sandbox {
     }
 
     /// A file of this instance's stack.
-    pub fn file(&self, name: &str) -> PathBuf {
+    pub(crate) fn file(&self, name: &str) -> PathBuf {
         self.folder.path().join(format!("{}-{name}", self.name))
     }
 
     /// The instance of this sandbox.
-    pub fn instance(&self) -> Instance {
+    pub(crate) fn instance(&self) -> Instance {
         Instance::below(&self.run_time().join("kerbside"), self.name).unwrap()
     }
 
@@ -77,7 +77,7 @@ impl Sandbox {
     }
 
     /// Processes that were started here, with what they are.
-    pub fn processes(&self) -> Vec<(u32, String)> {
+    pub(crate) fn processes(&self) -> Vec<(u32, String)> {
         let mark = format!("{MARK}={}\0", self.mark());
         let entries = fs::read_dir("/proc").unwrap().flatten();
         let pids = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
@@ -88,7 +88,7 @@ impl Sandbox {
     }
 
     /// Segments of the instance in shared memory.
-    pub fn segments(&self) -> Vec<String> {
+    pub(crate) fn segments(&self) -> Vec<String> {
         let prefix = self.instance().prefix();
         let names = fs::read_dir("/dev/shm").unwrap().flatten();
         let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
@@ -99,7 +99,7 @@ impl Sandbox {
     ///
     /// # Panics
     /// Where a process, a segment or a file is left.
-    pub fn assert_empty(&self) {
+    pub(crate) fn assert_empty(&self) {
         assert_eq!(self.processes(), [], "processes are left");
         assert_eq!(self.segments(), Vec::<String>::new(), "segments are left");
         assert!(!self.instance().folder().exists(), "the instance's folder is left");

@@ -11,8 +11,9 @@ use serde_json::Value;
 
 pub use rustix::process::Signal;
 
-use super::observer::Observer;
+use super::disturbance::end_if_stalled;
 use super::judging::ROLLING_OUT;
+use super::observer::Observer;
 use super::{PATIENCE, Sandbox, Seen};
 
 /// Time between looks at what cannot be waited for.
@@ -20,7 +21,7 @@ const LOOK: Duration = Duration::from_millis(5);
 
 /// A running stack with its observer.
 #[derive(Debug)]
-pub struct Stack {
+pub(crate) struct Stack {
     // Ended in this order.
     observer: Observer,
     child: Child,
@@ -29,48 +30,64 @@ pub struct Stack {
 
 /// How a verb ended.
 #[derive(Clone, Debug)]
-pub struct Outcome {
-    pub code: Option<i32>,
+pub(crate) struct Outcome {
+    pub(crate) code: Option<i32>,
     /// What it printed with `--json`; null where that is none.
-    pub json: Value,
-    pub stderr: String,
+    pub(crate) json: Value,
+    pub(crate) stderr: String,
     /// What the observer saw of a stack; empty for a verb.
-    pub seen: Seen,
+    pub(crate) seen: Seen,
 }
 
 impl Outcome {
+    /// The verdict must be good; the attempt ends where the machine stalled somebody else than the harmed process.
+    pub(crate) fn assert_good(&self, harmed: Option<Process>) {
+        if self.code != Some(0) {
+            end_if_stalled(self.cause(), harmed);
+        }
+        assert_eq!(self.code, Some(0), "{self:?}");
+    }
+
     /// Its verdict in words.
-    pub fn cause(&self) -> &str {
+    pub(crate) fn cause(&self) -> &str {
         self.json["cause"].as_str().unwrap_or_default()
     }
 }
 
 impl Stack {
     /// `park` with these arguments.
-    pub fn park(arguments: &[&str]) -> Self {
+    pub(crate) fn park(arguments: &[&str]) -> Self {
         Self::park_in(Sandbox::new(), arguments)
     }
 
     /// The same in a certain sandbox.
-    pub fn park_in(sandbox: Sandbox, arguments: &[&str]) -> Self {
+    pub(crate) fn park_in(sandbox: Sandbox, arguments: &[&str]) -> Self {
         let mut verb = vec!["park", "--headless", "--json"];
         verb.extend(arguments);
         Self::start(sandbox, &verb)
     }
 
+    /// `replay` with these arguments.
+    pub(crate) fn replay(arguments: &[&str]) -> Self {
+        let mut verb = vec!["replay", "--json"];
+        verb.extend(arguments);
+        Self::start(Sandbox::new(), &verb)
+    }
+
     /// `up --simulate` with these arguments.
-    pub fn up(arguments: &[&str]) -> Self {
+    pub(crate) fn up(arguments: &[&str]) -> Self {
         Self::up_in(Sandbox::new(), arguments)
     }
 
     /// `up --simulate` once more in a sandbox whose first supervisor ended.
-    pub fn up_in(sandbox: Sandbox, arguments: &[&str]) -> Self {
+    pub(crate) fn up_in(sandbox: Sandbox, arguments: &[&str]) -> Self {
         let mut verb = vec!["up", "--simulate"];
         verb.extend(arguments);
         Self::start(sandbox, &verb)
     }
 
-    fn start(sandbox: Sandbox, verb: &[&str]) -> Self {
+    /// Any verb that runs a stack.
+    pub(crate) fn start(sandbox: Sandbox, verb: &[&str]) -> Self {
         let file = |name: &str| File::create(sandbox.file(name)).unwrap();
         let (stdout, stderr) = (file("stdout"), file("stderr"));
         let mut command = sandbox.kerbside();
@@ -82,17 +99,17 @@ impl Stack {
     }
 
     /// Where it lives.
-    pub fn sandbox(&self) -> &Sandbox {
+    pub(crate) fn sandbox(&self) -> &Sandbox {
         &self.sandbox
     }
 
     /// The instance.
-    pub fn instance(&self) -> Instance {
+    pub(crate) fn instance(&self) -> Instance {
         self.sandbox.instance()
     }
 
     /// Everything seen so far.
-    pub fn seen(&self) -> Seen {
+    pub(crate) fn seen(&self) -> Seen {
         self.observer.seen()
     }
 
@@ -100,29 +117,43 @@ impl Stack {
     ///
     /// # Panics
     /// Where it does not come.
-    pub fn until<T>(&self, what: &str, found: impl Fn(&Seen) -> Option<T>) -> T {
+    pub(crate) fn until<T>(&self, what: &str, found: impl Fn(&Seen) -> Option<T>) -> T {
         let result = self.observer.wait(PATIENCE, found);
         result.unwrap_or_else(|| panic!("{what} does not come\n{}", self.tale()))
     }
 
     /// Waits for a mode.
-    pub fn until_mode(&self, mode: Mode) {
+    pub(crate) fn until_mode(&self, mode: Mode) {
         self.until(mode.name(), |seen| seen.in_mode(mode).map(|_| ()));
     }
 
-    /// Waits until the vehicle has rolled so far under this plan.
-    pub fn until_rolled(&self, metres: f64) {
-        let rolled = |seen: &Seen| (seen.distance() > metres).then_some(());
-        self.until(&format!("{metres} m"), rolled);
+    /// Waits until the vehicle drives and has rolled so far since its start.
+    pub(crate) fn until_driving(&self, metres: f64) {
+        let called = now();
+        let halted = [Mode::Stopping, Mode::Faulted, Mode::Down].map(Mode::name);
+        let stopped = self.until(&format!("a drive of {metres} m"), |seen| {
+            let state = seen.state()?;
+            if state.mode == Mode::Driving.name() && seen.distance() > metres {
+                return Some(None);
+            }
+            let stopped = state.sent > called && halted.contains(&state.mode.as_str());
+            stopped.then(|| Some(state.clone()))
+        });
+        if let Some(state) = stopped {
+            end_if_stalled(&format!("{}: {}", state.cause, state.words), None);
+            panic!("it stopped by itself\n{}", self.tale());
+        }
     }
 
     /// Waits until a vehicle that drove only rolls out: without a supervisor nobody hears its truth for long.
-    pub fn until_stands(&self) {
-        self.until("standstill", |seen| (seen.truth.last()?.speed.abs() < ROLLING_OUT).then_some(()));
+    pub(crate) fn until_stands(&self) {
+        self.until("standstill", |seen| {
+            (seen.truth.last()?.speed.abs() < ROLLING_OUT).then_some(())
+        });
     }
 
     /// Waits until the stack is in `mode`, with all processes healthy and the pose known.
-    pub fn until_recovered(&self, mode: Mode, since: Nanos) -> Nanos {
+    pub(crate) fn until_recovered(&self, mode: Mode, since: Nanos) -> Nanos {
         self.until(&format!("recovery to {mode}"), |seen| {
             let state = seen.in_mode(mode).filter(|state| state.healthy && state.sent > since)?;
             let known = seen.odometry.last()?;
@@ -130,43 +161,54 @@ impl Stack {
         })
     }
 
-    /// Tells a vehicle that stands where it is: in metres and degrees.
-    pub fn fix(&self, x: &str, y: &str, yaw: &str) {
+    /// Waits until the estimate says that the vehicle stands: a restarted process has to see it for a moment.
+    pub(crate) fn until_standstill(&self) {
         self.until("standstill", |seen| seen.odometry.last()?.standstill.then_some(()));
+    }
+
+    /// Tells a vehicle that stands where it is: in metres and degrees.
+    pub(crate) fn fix(&self, x: &str, y: &str, yaw: &str) {
+        self.until_standstill();
         self.must(&["fix", x, y, yaw]);
     }
 
+    /// Has a vehicle that stands drive to a scenario's goal.
+    pub(crate) fn go(&self, scenario: &str) -> Verb {
+        self.until_standstill();
+        self.begin(&["go", scenario])
+    }
+
     /// The pid of a process; waits for it.
-    pub fn pid(&self, process: Process) -> u32 {
+    pub(crate) fn pid(&self, process: Process) -> u32 {
         let path = self.instance().process_lock(process);
         self.poll(&format!("process {process}"), || FileLock::holder(&path))
     }
 
     /// Signals a process; returns the pid, and when it was done.
-    pub fn signal(&self, process: Process, signal: Signal) -> (u32, Nanos) {
+    pub(crate) fn signal(&self, process: Process, signal: Signal) -> (u32, Nanos) {
         let pid = self.pid(process);
         send(pid, signal);
         (pid, now())
     }
 
     /// Signals the process the person started.
-    pub fn signal_main(&self, signal: Signal) -> Nanos {
+    pub(crate) fn signal_main(&self, signal: Signal) -> Nanos {
         send(self.child.id(), signal);
         now()
     }
 
     /// Has somebody inhibit motion for so long.
-    pub fn inhibit(&mut self, span: Duration) {
+    pub(crate) fn inhibit(&mut self, span: Duration) {
         self.observer.inhibit(span);
     }
 
     /// Runs another verb on this stack.
-    pub fn verb(&self, arguments: &[&str]) -> Outcome {
+    pub(crate) fn verb(&self, arguments: &[&str]) -> Outcome {
         self.begin(arguments).end()
     }
 
     /// The same, which takes its time.
-    pub fn begin(&self, arguments: &[&str]) -> Verb {
+    pub(crate) fn begin(&self, arguments: &[&str]) -> Verb {
         let mut command = self.sandbox.kerbside();
         let (verb, rest) = arguments.split_first().unwrap();
         command.args([verb, "--json", "--instance", self.instance().name()]).args(rest);
@@ -174,21 +216,21 @@ impl Stack {
     }
 
     /// The same, which must do what it was asked.
-    pub fn must(&self, arguments: &[&str]) -> Value {
+    pub(crate) fn must(&self, arguments: &[&str]) -> Value {
         let outcome = self.verb(arguments);
         assert_eq!(outcome.code, Some(0), "{arguments:?}: {outcome:?}\n{}", self.tale());
         outcome.json
     }
 
     /// Waits for the end of what the person started, and holds it against leaving nothing.
-    pub fn end(self) -> Outcome {
+    pub(crate) fn end(self) -> Outcome {
         let (outcome, sandbox) = self.end_and_keep();
         sandbox.assert_empty();
         outcome
     }
 
     /// Waits for the end of what the person started; what it left stays.
-    pub fn end_and_keep(mut self) -> (Outcome, Sandbox) {
+    pub(crate) fn end_and_keep(mut self) -> (Outcome, Sandbox) {
         let ended = poll(PATIENCE, || self.child.try_wait().unwrap());
         let Some(status) = ended else { panic!("it does not end\n{}", self.tale()) };
         let read = |name: &str| fs::read_to_string(self.sandbox.file(name)).unwrap();
@@ -200,7 +242,7 @@ impl Stack {
     }
 
     /// Ends a stack of `up` in order.
-    pub fn down(self) -> Outcome {
+    pub(crate) fn down(self) -> Outcome {
         self.must(&["down"]);
         self.end()
     }
@@ -209,12 +251,12 @@ impl Stack {
     ///
     /// # Panics
     /// Where it does not come.
-    pub fn poll<T>(&self, what: &str, look: impl FnMut() -> Option<T>) -> T {
+    pub(crate) fn poll<T>(&self, what: &str, look: impl FnMut() -> Option<T>) -> T {
         poll(PATIENCE, look).unwrap_or_else(|| panic!("{what} does not come\n{}", self.tale()))
     }
 
     /// What happened, for a test that failed.
-    pub fn tale(&self) -> String {
+    pub(crate) fn tale(&self) -> String {
         let seen = self.seen();
         let stderr = fs::read_to_string(self.sandbox.file("stderr")).unwrap_or_default();
         let (truth, odometry) = (seen.truth.last(), seen.odometry.last());
@@ -235,11 +277,11 @@ impl From<Output> for Outcome {
 
 /// A verb that runs.
 #[derive(Debug)]
-pub struct Verb(Child);
+pub(crate) struct Verb(Child);
 
 impl Verb {
     /// Starts it.
-    pub fn start(mut command: Command) -> Self {
+    pub(crate) fn start(mut command: Command) -> Self {
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         Self(command.spawn().unwrap())
     }
@@ -248,7 +290,7 @@ impl Verb {
     ///
     /// # Panics
     /// Where it does not come.
-    pub fn end(mut self) -> Outcome {
+    pub(crate) fn end(mut self) -> Outcome {
         let ended = poll(PATIENCE, || self.0.try_wait().unwrap());
         if ended.is_none() {
             self.0.kill().unwrap();
@@ -260,7 +302,7 @@ impl Verb {
 }
 
 /// Looks again and again; none after `bound`.
-pub fn poll<T>(bound: Duration, mut look: impl FnMut() -> Option<T>) -> Option<T> {
+pub(crate) fn poll<T>(bound: Duration, mut look: impl FnMut() -> Option<T>) -> Option<T> {
     let deadline = now() + u64::try_from(bound.as_nanos()).unwrap();
     let mut pause = Ticker::new(LOOK);
     loop {
@@ -273,7 +315,7 @@ pub fn poll<T>(bound: Duration, mut look: impl FnMut() -> Option<T>) -> Option<T
 }
 
 /// Sends a signal to a process that a test started.
-pub fn send(pid: u32, signal: Signal) {
+pub(crate) fn send(pid: u32, signal: Signal) {
     let pid = Pid::from_raw(i32::try_from(pid).unwrap()).unwrap();
     kill_process(pid, signal).unwrap();
 }

@@ -12,11 +12,12 @@ use kerbside_messages::topics::{Delivery, Publisher, TABLE, Topic};
 use crate::{assert_none, root};
 
 /// Pages for people.
-const PAGES: [&str; 5] = [
+const PAGES: [&str; 6] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "deploy/README.md",
+    "docs/run-folders.md",
     "deploy/examples/microcontroller/README.md",
 ];
 

@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use crate::root;
 
 /// A source file.
-pub struct Source {
+pub(crate) struct Source {
     /// Path below the repository's root.
-    pub path: String,
+    pub(crate) path: String,
     /// The whole text.
-    pub text: String,
+    pub(crate) text: String,
     /// The text with comments and the contents of literals blanked out; lines stay where they are.
-    pub code: String,
+    pub(crate) code: String,
 }
 
 impl Source {
@@ -23,13 +23,13 @@ impl Source {
     }
 
     /// Whether the file is a test or belongs to one, as a whole.
-    pub fn is_test(&self) -> bool {
+    pub(crate) fn is_test(&self) -> bool {
         let mut parts = self.path.split('/');
         parts.any(|part| matches!(part, "tests" | "tests.rs" | "benches" | "examples"))
     }
 
     /// The code without its test modules.
-    pub fn code_of_work(&self) -> String {
+    pub(crate) fn code_of_work(&self) -> String {
         if self.is_test() {
             return String::new();
         }
@@ -44,7 +44,7 @@ impl Source {
 }
 
 /// Every source of the repository, in the order of their paths.
-pub fn all() -> Vec<Source> {
+pub(crate) fn all() -> Vec<Source> {
     let mut paths = Vec::new();
     for folder in ["services", "shared", "tests"] {
         collect(&root().join(folder), &mut paths);
@@ -65,7 +65,7 @@ fn collect(folder: &Path, paths: &mut Vec<PathBuf>) {
 }
 
 /// End of the item that begins at or behind `at`: its closing brace, or its semicolon.
-pub fn item_end(code: &str, at: usize) -> usize {
+pub(crate) fn item_end(code: &str, at: usize) -> usize {
     let mut depth = 0_usize;
     for (index, letter) in code[at..].char_indices() {
         match letter {
@@ -80,12 +80,12 @@ pub fn item_end(code: &str, at: usize) -> usize {
 }
 
 /// Number of the line that the byte `at` is in, from 1.
-pub fn line_of(code: &str, at: usize) -> usize {
+pub(crate) fn line_of(code: &str, at: usize) -> usize {
     1 + code[..at].matches('\n').count()
 }
 
 /// Where `word` stands by itself, not within another word.
-pub fn words<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 'a {
+pub(crate) fn words<'a>(code: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 'a {
     let is_part = |letter: char| letter.is_alphanumeric() || letter == '_';
     code.match_indices(word).map(|(at, _)| at).filter(move |at| {
         let before = code[..*at].chars().next_back();

@@ -4,6 +4,7 @@ mod chain;
 mod hop;
 mod peer;
 mod pipeline;
+mod replay;
 mod rows;
 mod start;
 mod statistics;
@@ -26,6 +27,9 @@ pub enum BenchVerb {
     /// A whole stack from nothing to READY.
     #[command(after_help = "Example: kerbside bench start --repeats 10")]
     Start(start::StartArgs),
+    /// Recorded readings through ingest and estimator in one process, against real time.
+    #[command(after_help = "Example: kerbside bench replay --minutes 60")]
+    Replay(replay::ReplayBenchArgs),
     /// The other process of `transport`.
     #[command(hide = true)]
     Peer(peer::PeerArgs),
@@ -43,6 +47,7 @@ pub fn run(verb: &BenchVerb) -> Result<Exit, Failure> {
         BenchVerb::Transport(args) => transport::run(args),
         BenchVerb::Pipeline(args) => pipeline::run(args),
         BenchVerb::Start(args) => start::run(args),
+        BenchVerb::Replay(args) => replay::run(args),
         BenchVerb::Peer(args) => peer::run(args),
         BenchVerb::Link(args) => chain::run_link(args),
     }

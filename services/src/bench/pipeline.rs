@@ -42,6 +42,9 @@ pub struct PipelineArgs {
     /// Seconds of driving that are measured, for each way of scheduling.
     #[arg(long, default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..))]
     seconds: u32,
+    /// Leave real-time scheduling out.
+    #[arg(long)]
+    ordinary: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -100,7 +103,8 @@ pub fn run(args: &PipelineArgs) -> Result<Exit, Failure> {
     let mut told =
         Told { verb: "pipeline", rows: vec![], figures: vec![], notes: vec![], more: json!({}) };
     let mut ways = Vec::new();
-    for scheduling in Scheduling::all() {
+    let all = Scheduling::all().into_iter().take(if args.ordinary { 1 } else { usize::MAX });
+    for scheduling in all {
         let refused = scheduling.refused();
         if !refused.is_empty() {
             told.notes.push(format!("{}: skipped: {}", scheduling.name, refused.join("; ")));
@@ -374,7 +378,8 @@ impl Measured {
 
     /// Each process's work per reading \[us\].
     fn each(windows: &[Vec<f64>], places: &[Process]) -> Vec<(Process, f64)> {
-        let of = |index: usize| windows.iter().filter_map(|each| each.get(index).copied()).collect();
+        let of =
+            |index: usize| windows.iter().filter_map(|each| each.get(index).copied()).collect();
         let each = |(index, process): (usize, &Process)| (*process, median(of(index)));
         places.iter().enumerate().map(each).collect()
     }

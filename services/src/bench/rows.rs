@@ -15,11 +15,11 @@ pub struct Row {
     pub name: String,
     /// Bytes of the payload.
     pub bytes: usize,
-    /// Ours: p50 and p99 \[us\].
+    /// Ours: p50 of everything, p99 of a block in the middle of blocks \[us\].
     pub ours: (f64, f64),
     /// The rival's name.
     pub rival: String,
-    /// The rival: p50 and p99 \[us\].
+    /// The same of the rival \[us\].
     pub rivals: (f64, f64),
     /// Ours over the rival's, p50.
     pub ratio: Estimate,
@@ -29,7 +29,7 @@ impl Row {
     /// A row of latencies.
     #[must_use]
     pub fn of(name: &str, bytes: usize, ours: &Blocks, rival: &str, rivals: &Blocks) -> Self {
-        let both = |blocks: &Blocks| (blocks.percentile(0.5), blocks.percentile(0.99));
+        let both = |blocks: &Blocks| (blocks.percentile(0.5), blocks.percentile_of_a_block(0.99));
         Self {
             name: name.to_owned(),
             bytes,
@@ -40,7 +40,7 @@ impl Row {
         }
     }
 
-    /// Ours over the rival's at p99, all blocks together.
+    /// Ours over the rival's at p99.
     #[must_use]
     pub fn ratio_p99(&self) -> f64 {
         self.ours.1 / self.rivals.1

@@ -1,6 +1,8 @@
 //! `bench start`: a whole stack from nothing to READY, again and again.
 
+use std::fs;
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::Stdio;
 
 use kerbside_messages::seconds;
@@ -11,6 +13,7 @@ use super::rows::{Told, tell};
 use super::statistics::median;
 use crate::exit::{Exit, Failure};
 use crate::figures::Figure;
+use crate::output;
 
 /// A start may take so long \[s\].
 const LIMIT: f64 = 2.0;
@@ -31,7 +34,12 @@ pub struct StartArgs {
 /// # Errors
 /// [`Failure`] where a stack does not start.
 pub fn run(args: &StartArgs) -> Result<Exit, Failure> {
-    let times = (0..args.repeats).map(start_once).collect::<Result<Vec<_>, _>>()?;
+    let folder = std::env::temp_dir().join(format!("kerbside-bench-{}", output::stamp()));
+    let folder = output::folder(Some(&folder), "bench")?;
+    let times: Result<Vec<_>, _> =
+        (0..args.repeats).map(|index| start_once(index, &folder)).collect();
+    fs::remove_dir_all(&folder).map_err(Failure::internal)?;
+    let times = times?;
     let longest = times.iter().copied().fold(f64::NAN, f64::max);
     let told = Told {
         verb: "start",
@@ -48,10 +56,11 @@ pub fn run(args: &StartArgs) -> Result<Exit, Failure> {
 }
 
 /// Seconds from the start of a fresh instance, with its simulated vehicle, until it says that it is ready.
-fn start_once(index: u32) -> Result<f64, Failure> {
+fn start_once(index: u32, folder: &Path) -> Result<f64, Failure> {
     let name = format!("{}-{index}", Instance::fresh_name("start"));
     let mut command = super::own_executable();
     command.args(["--log", "error", "up", "--simulate", "--instance", &name]);
+    command.arg("--recording").arg(folder.join(format!("{index}.mcap")));
     kerbside_runtime::close_inherited_on_exec();
     let begun = now();
     let mut child = command

@@ -32,15 +32,22 @@ impl Blocks {
         percentile(self.0.iter().flatten(), quantile)
     }
 
-    /// The median of each block \[us\].
-    fn medians(&self) -> Vec<f64> {
-        self.0.iter().map(|block| percentile(block, 0.5)).collect()
+    /// Percentile `quantile` of each block \[us\].
+    fn each(&self, quantile: f64) -> Vec<f64> {
+        self.0.iter().map(|block| percentile(block, quantile)).collect()
+    }
+
+    /// Percentile `quantile` of a block; the median over blocks \[us\]. A pause of the whole machine spoils the blocks
+    /// it falls into, and no others.
+    #[must_use]
+    pub fn percentile_of_a_block(&self, quantile: f64) -> f64 {
+        median(self.each(quantile))
     }
 
     /// The ratio of this one's medians to `rival`'s, block by block; the median over blocks.
     #[must_use]
     pub fn ratio(&self, rival: &Self) -> Estimate {
-        let pairs = self.medians().into_iter().zip(rival.medians());
+        let pairs = self.each(0.5).into_iter().zip(rival.each(0.5));
         median_of(&pairs.map(|(ours, rivals)| ours / rivals).collect::<Vec<_>>())
     }
 }
@@ -112,6 +119,9 @@ mod tests {
         assert!((blocks.percentile(0.5) - 500.0).abs() < 1.0);
         assert!((blocks.percentile(0.99) - 990.0).abs() < 1.5);
         assert!(Blocks::default().percentile(0.5).is_nan());
+        let paused = Blocks(vec![vec![1_000; 9], vec![1_000; 9], vec![9_000_000; 9]]);
+        assert!((paused.percentile_of_a_block(0.99) - 1.0).abs() < 0.01);
+        assert!(paused.percentile(0.99) > 8_000.0);
     }
 
     #[test]

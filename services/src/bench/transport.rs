@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Stdio};
 
-use kerbside_messages::{Command, Odometry, Raw, Travel};
+use kerbside_messages::{Command, MAX_PLAN_POINTS, Odometry, Plan, Raw, TrajectoryPoint, Travel};
 use kerbside_messages::{Message, check_sum};
 use kerbside_runtime::{Instance, RealtimeRequest, Services, Session, Ticker, enter_realtime, now};
 use serde_json::{Value, json};
@@ -23,6 +23,8 @@ use crate::exit::{Exit, Failure};
 const LIMIT_P50: f64 = 1.25;
 /// The same at p99.
 const LIMIT_P99: f64 = 2.0;
+/// Priority of both ends.
+const PRIORITY: u8 = 50;
 /// Time between plans: each keeps two caches busy for a while.
 const PLAN_GAP: Duration = Duration::from_millis(3);
 
@@ -38,9 +40,9 @@ pub struct TransportArgs {
     /// Time between samples [us].
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(300..))]
     gap: u64,
-    /// Run both ends under SCHED_FIFO with this priority.
-    #[arg(long, value_name = "PRIORITY", value_parser = clap::value_parser!(u8).range(1..=99))]
-    priority: Option<u8>,
+    /// Leave both ends to the ordinary scheduler, even where the rights for SCHED_FIFO are there.
+    #[arg(long)]
+    ordinary: bool,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -66,13 +68,13 @@ pub fn run(args: &TransportArgs) -> Result<Exit, Failure> {
 }
 
 fn measure(args: &TransportArgs, session: &Session) -> Result<Told, Failure> {
-    let cores = Cores::of_machine();
+    let cores = Cores::of_machine(args.ordinary);
     let mut bench = Bench::start(args, session, &cores)?;
     let mut told = Told {
         verb: "transport",
         rows: Vec::new(),
         figures: Vec::new(),
-        notes: cores.notes(args.priority),
+        notes: cores.notes(),
         more: json!({ "check_sums": check_sums() }),
     };
     for subject in Subject::PATH {
@@ -85,28 +87,31 @@ fn measure(args: &TransportArgs, session: &Session) -> Result<Told, Failure> {
     Ok(told)
 }
 
-/// The cores the two ends run on.
+/// Where and how the two ends run; the same for every rival.
 struct Cores {
     sender: usize,
     other: usize,
+    priority: Option<u8>,
 }
 
 impl Cores {
-    fn of_machine() -> Self {
+    /// The first core and the last; under SCHED_FIFO where it is granted: the tail is then the hop's own, and not
+    /// that of whoever else runs on the machine.
+    fn of_machine(ordinary: bool) -> Self {
         let count = std::thread::available_parallelism().map_or(1, core::num::NonZero::get);
-        Self { sender: 0, other: count - 1 }
+        let request = RealtimeRequest { priority: Some(PRIORITY), ..RealtimeRequest::default() };
+        let granted = std::thread::spawn(move || enter_realtime(&request).scheduled).join();
+        let priority = (!ordinary && granted.unwrap_or(false)).then_some(PRIORITY);
+        Self { sender: 0, other: count - 1, priority }
     }
 
-    fn notes(&self, priority: Option<u8>) -> Vec<String> {
-        let mut notes = Vec::new();
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![match self.priority {
+            Some(_) => "both ends under SCHED_FIFO".to_owned(),
+            None => "both ends under the ordinary scheduler".to_owned(),
+        }];
         if self.other == self.sender {
             notes.push("one core: sender and receiver share it".to_owned());
-        }
-        if let Some(priority) = priority {
-            let request =
-                RealtimeRequest { priority: Some(priority), ..RealtimeRequest::default() };
-            let refused = std::thread::spawn(move || enter_realtime(&request).refused).join();
-            notes.extend(refused.unwrap_or_default());
         }
         notes
     }
@@ -131,7 +136,7 @@ impl<'a> Bench<'a> {
     ) -> Result<Self, Failure> {
         let mut command = super::own_executable();
         command.args(["bench", "peer", "--instance", session.instance().name()]);
-        if let Some(priority) = args.priority {
+        if let Some(priority) = cores.priority {
             command.args(["--priority", &priority.to_string()]);
         }
         kerbside_runtime::close_inherited_on_exec();
@@ -144,7 +149,7 @@ impl<'a> Bench<'a> {
             return Err(Failure::internal("no pipes to the receiving process"));
         };
         let request = RealtimeRequest {
-            priority: args.priority,
+            priority: cores.priority,
             cores: vec![cores.sender],
             ..RealtimeRequest::default()
         };
@@ -288,18 +293,21 @@ impl Drop for Bench<'_> {
 
 /// What the check sum of a sample costs one end of a hop \[ns\].
 fn check_sums() -> Vec<Value> {
-    fn one<M: Message>() -> Value {
-        const ROUNDS: u32 = 20_000;
+    fn one<M: Message>(tail: &[u8]) -> Value {
+        const ROUNDS: u32 = 5_000;
         let message = M::default();
         let begun = now();
         for _ in 0..ROUNDS {
-            core::hint::black_box(check_sum(core::hint::black_box(&message), &[]));
+            core::hint::black_box(check_sum(core::hint::black_box(&message), tail));
         }
         #[allow(clippy::cast_precision_loss)] // milliseconds
         let nanos = (now() - begun) as f64 / f64::from(ROUNDS);
-        json!({ "name": M::TOPIC.name, "bytes": size_of::<M>(), "ns": nanos })
+        json!({ "name": M::TOPIC.name, "bytes": size_of::<M>() + tail.len(), "ns": nanos })
     }
-    vec![one::<Raw>(), one::<Travel>(), one::<Odometry>(), one::<Command>()]
+    vec![one::<Raw>(&[]), one::<Travel>(&[]), one::<Odometry>(&[]), one::<Command>(&[]), {
+        let points = vec![TrajectoryPoint::default(); MAX_PLAN_POINTS];
+        one::<Plan>(bytemuck::cast_slice(&points))
+    }]
 }
 
 fn check_sums_in_words(sums: &Value) -> String {

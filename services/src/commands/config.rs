@@ -112,7 +112,9 @@ fn check_all(config: Option<&std::path::Path>, as_json: bool) -> Result<Exit, Fa
     } else if problems.is_empty() {
         println!("no problem found");
     } else {
-        eprintln!("{:?}", miette::Report::new(Refused::new(&problems)));
+        let report = miette::Report::new(Refused::new(&problems));
+        let exit = if refused { Exit::Configuration } else { Exit::Good };
+        return Ok(Failure { exit, report }.tell(false));
     }
     Ok(if refused { Exit::Configuration } else { Exit::Good })
 }

@@ -50,7 +50,12 @@ pub fn run(args: &FixArgs) -> Result<Exit, Failure> {
     let mut odometry = Newest::of(desk.session.subscriber::<Odometry>(None, 1)?);
     let mut publisher = desk.session.publisher::<Fix>(None)?;
     let none = "no estimate comes: is the vehicle's line up? kerbside status tells";
-    let before = wait_for(&mut odometry, |_| true, none)?;
+    wait_for(&mut odometry, |_| true, none)?;
+    // A vehicle that came to rest a moment ago is known to stand a moment later; one that drives is refused below.
+    let before = match wait_for(&mut odometry, |odometry| odometry.standstill == 1, "") {
+        Ok(standing) => standing,
+        Err(_) => wait_for(&mut odometry, |_| true, none)?,
+    };
     publisher.send(|fix| {
         *fix = Fix { header: Header::stamped(now(), 0), ..content };
         true

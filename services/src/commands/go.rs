@@ -93,9 +93,7 @@ impl Wish {
                 Ok(Self::Free { goal, vehicle })
             }
             ([_], Some(_)) => Err(usage("--among goes with a pose; a scenario has its own")),
-            (goal, _) => {
-                Err(usage(&format!("found {}, {ALLOWED}", goal.join(" "))))
-            }
+            (goal, _) => Err(usage(&format!("found {}, {ALLOWED}", goal.join(" ")))),
         }
     }
 
@@ -107,8 +105,7 @@ impl Wish {
     }
 }
 
-const ALLOWED: &str =
-    "allowed are a scenario, or three numbers: x and y in metres, yaw in degrees";
+const ALLOWED: &str = "allowed are a scenario, or three numbers: x and y in metres, yaw in degrees";
 
 fn usage(words: &str) -> Failure {
     Failure::new(Exit::Usage, words)
@@ -283,7 +280,8 @@ mod tests {
     #[test]
     fn a_way_through_free_space_is_found_in_any_direction() {
         let stack = configuration::stack(None, None).unwrap();
-        for (x, y, yaw) in [(2.0, 0.0, 0.0), (-1.0, 0.5, 90.0), (0.3, 1.2, 180.0), (0.0, 0.0, -90.0)]
+        for (x, y, yaw) in
+            [(2.0, 0.0, 0.0), (-1.0, 0.5, 90.0), (0.3, 1.2, 180.0), (0.0, 0.0, -90.0)]
         {
             let (start, goal) = (Pose::default(), Pose::new(x, y, angle::radians(yaw)));
             let request = free(&stack.vehicle, &start, &goal);

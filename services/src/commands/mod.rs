@@ -12,6 +12,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
 use kerbside_messages::Process;
+use kerbside_runtime::Instance;
 
 use crate::exit::{Exit, Failure};
 use crate::park::ParkArgs;
@@ -77,7 +78,7 @@ enum Verb {
     #[command(subcommand, after_help = "Example: kerbside recording check recording.mcap")]
     Recording(recording::RecordingVerb),
     /// Measure hops, the pipeline and the start, and hold them against limits.
-    #[command(subcommand)]
+    #[command(subcommand, after_help = "Example: kerbside bench transport --json")]
     Bench(crate::bench::BenchVerb),
     /// Run one process of a stack; the supervisor starts them by itself.
     #[command(subcommand, after_help = "Example: kerbside service tracker --instance bay2")]
@@ -120,7 +121,8 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
     let level = cli.log.as_deref();
     // A file that may not grow is an error to report, no reason to die.
     let ignored = std::sync::Arc::default();
-    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored).map_err(Failure::internal)?;
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
+        .map_err(Failure::internal)?;
     match &cli.verb {
         Verb::Park(args) => {
             let level = level.unwrap_or("warn");
@@ -174,8 +176,11 @@ fn operate(verb: &Verb) -> Result<Exit, Failure> {
     }
 }
 
+/// What a supervised process does.
+type Body = fn(&Service) -> Result<Exit, Failure>;
+
 fn serve(verb: &ServiceVerb, level: Option<&str>) -> Result<Exit, Failure> {
-    let (process, args, body): (_, _, fn(&Service) -> Result<Exit, Failure>) = match verb {
+    let (process, args, body): (_, _, Body) = match verb {
         ServiceVerb::Interface(args) => (Process::Interface, args, interface::run),
         ServiceVerb::Ingest(args) => (Process::Ingest, args, ingest::run),
         ServiceVerb::Estimator(args) => (Process::Estimator, args, estimator::run),
@@ -186,12 +191,21 @@ fn serve(verb: &ServiceVerb, level: Option<&str>) -> Result<Exit, Failure> {
         ServiceVerb::Vehicle(args) => {
             let service = Service::load(Process::Vehicle, &args.service, DEFAULT_INSTANCE)?;
             start_log(&service, level);
-            return vehicle::run(args, service);
+            let instance = service.instance.clone();
+            return leave(&instance, vehicle::run(args, service));
         }
     };
     let service = Service::load(process, args, DEFAULT_INSTANCE)?;
     start_log(&service, level);
-    body(&service)
+    leave(&service.instance, body(&service))
+}
+
+/// Where a process ends that no supervisor survives, nothing of the instance is to stay.
+fn leave(instance: &Instance, ended: Result<Exit, Failure>) -> Result<Exit, Failure> {
+    if let Err(error) = instance.remove_if_deserted() {
+        tracing::warn!(%error, "something of the instance is left");
+    }
+    ended
 }
 
 fn start_log(service: &Service, level: Option<&str>) {

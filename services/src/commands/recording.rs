@@ -3,9 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use kerbside_messages::seconds;
-use kerbside_recordings::recording::{
-    CheckReport, RecordingError, RecoverReport, check, recover,
-};
+use kerbside_recordings::recording::{CheckReport, RecordingError, RecoverReport, check, recover};
 use serde_json::{Map, Value, json};
 
 use crate::exit::{Exit, Failure};
@@ -75,11 +73,8 @@ fn object(schema: &str, passed: bool, more: Value) -> Value {
 }
 
 fn check_as_json(report: &CheckReport, sound: bool) -> Value {
-    let topics: Map<String, Value> = report
-        .topics
-        .iter()
-        .map(|topic| (topic.channel.clone(), json!(topic.messages)))
-        .collect();
+    let topics: Map<String, Value> =
+        report.topics.iter().map(|topic| (topic.channel.clone(), json!(topic.messages))).collect();
     let more = json!({
         "recording": report.path, "bytes": report.bytes, "chunks": report.chunks, "messages": topics,
         "problems": report.problems(),

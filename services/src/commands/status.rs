@@ -133,10 +133,20 @@ fn print_table(instance: &Instance, state: &State) {
             row.restarts.to_string(),
             row.misses.to_string(),
             row.age_ms.to_string(),
-            text::as_str(&row.waiting_for).to_owned(),
+            says(row),
         ]);
     }
     println!("{table}");
+}
+
+/// What a process says of itself, or what is to be said of it.
+fn says(row: &ProcessRow) -> String {
+    let words = text::as_str(&row.waiting_for);
+    match ProcessState::from_code(row.state) {
+        Some(ProcessState::Starting) if !words.is_empty() => format!("waits for {words}"),
+        Some(ProcessState::External) if row.pid == 0 => "is started elsewhere".to_owned(),
+        _ => words.to_owned(),
+    }
 }
 
 fn name_of(row: &ProcessRow) -> &'static str {

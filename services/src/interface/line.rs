@@ -247,11 +247,7 @@ fn wait(door: &Door, listener: &kerbside_runtime::Listener) -> Woken {
 
 /// Takes in the newest actuator sample. Notifications are forgotten first, so that no sample is slept over; and where
 /// a sample came without one, its wake-up got lost or is about to come.
-fn take_in(
-    actuator: &mut Newest<Actuator>,
-    listener: &kerbside_runtime::Listener,
-    woken: Woken,
-) {
+fn take_in(actuator: &mut Newest<Actuator>, listener: &kerbside_runtime::Listener, woken: Woken) {
     if woken.by_samples {
         listener.drain();
     }

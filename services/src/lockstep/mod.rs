@@ -4,5 +4,4 @@
 mod channel;
 mod world;
 
-pub use channel::Channel;
 pub use world::{LineFault, Script, World, words_of};

@@ -10,8 +10,8 @@ use kerbside_messages::{
     PlanAnswer, PlanRequest, State, Truth, Verb,
 };
 use kerbside_runtime::{
-    Client, Newest, Pending, PlanSubscriber, Publisher, Session, SessionError,
-    Subscriber, Ticker, now,
+    Client, Newest, Pending, PlanSubscriber, Publisher, Session, SessionError, Subscriber, Ticker,
+    now,
 };
 
 use super::progress::Progress;

@@ -134,11 +134,7 @@ pub fn run(args: &ParkArgs) -> Result<Exit, Failure> {
     let mut finished = Vec::new();
     for index in 0..args.runs {
         let seed = args.seed + u64::from(index);
-        let folder = if args.runs == 1 {
-            folder.clone()
-        } else {
-            folder.join(seed.to_string())
-        };
+        let folder = if args.runs == 1 { folder.clone() } else { folder.join(seed.to_string()) };
         let one = run_one(args, seed, &folder)?;
         let interrupted = one.run.end == End::Interrupted;
         finished.push(one);
@@ -233,7 +229,7 @@ fn take_plan(trace: &mut Trace, at: Nanos, head: &Plan, points: &[TrajectoryPoin
     }
     let (length, seconds, changes) = (head.length, head.duration, head.gear_changes);
     let words =
-        format!("plan {}: {length:.2} m in {seconds:.1} s, {changes} gear changes", head.id);
+        format!("plan {}: {length:.2} m in {seconds:.1} s, gear changes: {changes}", head.id);
     trace.note(at, HappeningKind::Plan, words);
     trace.plans.push(Followed { head: *head, points: points.to_vec(), begun: None });
 }

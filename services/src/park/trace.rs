@@ -147,11 +147,8 @@ impl Trace {
             } else {
                 HappeningKind::Mode(mode)
             };
-            let words = if cause == Cause::None.name() {
-                mode.to_string()
-            } else {
-                format!("{mode}: {cause}")
-            };
+            let words =
+                if cause.is_empty() { mode.to_string() } else { format!("{mode}: {cause}") };
             self.happenings.push(Happening { at, kind, text: words });
         }
         let Some(before) = before else { return };

@@ -1,12 +1,11 @@
 //! Ingest and estimator in one thread, with the checks between them that shared memory would make.
 
-use kerbside_messages::{Admission, Odometry, Raw, Refusal, Refusals, Travel, seal};
+use kerbside_messages::{Admission, Odometry, Raw, Refusal, Refusals, Travel};
 use kerbside_odometry::{Estimator, EstimatorInputs, Ingest};
 
 use super::order::Order;
 use crate::exit::Failure;
 use crate::ingest::no_model;
-use crate::lockstep::Channel;
 use crate::service::Service;
 
 /// The two stages and what lies between.
@@ -15,10 +14,14 @@ pub struct Chain {
     order: Order,
     raw: Admission<Raw>,
     ingest: Ingest,
-    travel: Channel<Travel>,
+    travels: Admission<Travel>,
+    travel: Travel,
+    travel_sequence: u64,
     estimator: Estimator,
-    odometry: Channel<Odometry>,
-    refused: u32,
+    odometries: Admission<Odometry>,
+    odometry: Odometry,
+    odometry_sequence: u64,
+    rolled: [f64; 4],
 }
 
 impl Chain {
@@ -32,35 +35,44 @@ impl Chain {
             order: Order::default(),
             raw: Admission::default(),
             ingest: Ingest::with_sensors(vehicle, sensors, &stack.ingest).map_err(no_model)?,
-            travel: Channel::new(1),
+            travels: Admission::default(),
+            travel: Travel::default(),
+            travel_sequence: 0,
             estimator: Estimator::with_sensors(vehicle, sensors, &stack.estimator)
                 .map_err(no_model)?,
-            odometry: Channel::new(1),
-            refused: 0,
+            odometries: Admission::default(),
+            odometry: Odometry::default(),
+            odometry_sequence: 0,
+            rolled: [0.0; 4],
         })
     }
 
     /// The odometry that a reading leads to; none where it is refused.
-    pub fn step(&mut self, raw: &Raw) -> Option<Odometry> {
-        let Self { raw: admission, ingest, travel, estimator, odometry, .. } = self;
-        let (now, place) = (raw.arrival, self.order.place(raw));
-        let mut sealed = *raw;
-        seal(&mut sealed, &[], 1 + place.life, place.sequence, now);
-        let admitted = admission.admit(&sealed, &[], now).ok()?;
-        let (travel, passed) = travel.send(now, |out| {
-            ingest.step(&sealed, admitted.missing, admitted.new_epoch, out);
-            true
-        })?;
-        self.refused = travel.refused;
-        let estimate = odometry.send(now, |out| {
-            let (fix, restore) = (None, None);
-            estimator.step(
-                EstimatorInputs { travel: &travel, missing: passed.missing, fix, restore },
-                out,
-            );
-            true
-        });
-        estimate.map(|(odometry, _)| odometry)
+    pub fn step(&mut self, raw: &Raw) -> Option<&Odometry> {
+        let place = self.order.place(raw);
+        let admitted = self.raw.admit_unsealed(raw, 1 + place.life, place.sequence).ok()?;
+        self.ingest.step(raw, admitted.missing, admitted.new_epoch, &mut self.travel);
+        self.roll();
+        self.travel_sequence += 1;
+        let admitted = self.travels.admit_unsealed(&self.travel, 1, self.travel_sequence).ok()?;
+        let (travel, missing) = (&self.travel, admitted.missing);
+        let inputs = EstimatorInputs { travel, missing, fix: None, restore: None };
+        self.estimator.step(inputs, &mut self.odometry);
+        self.odometry_sequence += 1;
+        self.odometry.header.sequence = self.odometry_sequence;
+        self.odometries.admit_unsealed(&self.odometry, 1, self.odometry_sequence).ok()?;
+        Some(&self.odometry)
+    }
+
+    fn roll(&mut self) {
+        for (rolled, increment) in self.rolled.iter_mut().zip(self.travel.increment) {
+            *rolled += increment;
+        }
+    }
+
+    /// What each wheel has rolled by its valid readings \[m\].
+    pub fn rolled(&self) -> [f64; 4] {
+        self.rolled
     }
 
     /// What was refused on the way in, by reason.
@@ -73,8 +85,9 @@ impl Chain {
             .filter(|(_, count)| **count > 0)
             .map(|(index, count)| (named(index), *count))
             .collect();
-        if self.refused > 0 {
-            refusals.push(("repeated, or no vehicle can move so", u64::from(self.refused)));
+        if self.travel.refused > 0 {
+            let refused = u64::from(self.travel.refused);
+            refusals.push(("repeated, or no vehicle can move so", refused));
         }
         refusals
     }

@@ -2,11 +2,9 @@
 
 use kerbside_geometry::Pose;
 use kerbside_messages::{
-    EstimatorState, Nanos, NANOS_PER_SECOND, Odometry, OdometryModel, ResetReason,
+    EstimatorState, NANOS_PER_SECOND, Nanos, Odometry, OdometryModel, ResetReason,
 };
-use kerbside_recordings::drift::{
-    AlignedBy, Drift, ReferencePose, drift, reference_from_estimate,
-};
+use kerbside_recordings::drift::{AlignedBy, Drift, ReferencePose, drift, reference_from_estimate};
 use kerbside_recordings::input::Reference;
 
 use super::input::Input;
@@ -36,8 +34,7 @@ impl Comparison {
     /// # Errors
     /// [`Failure`] where the reference cannot be read.
     pub fn of(input: &Input, track: &Track) -> Result<Self, Failure> {
-        let reference =
-            input.drive.reference().map_err(|error| Failure::new(Exit::Data, error))?;
+        let reference = input.drive.reference().map_err(|error| Failure::new(Exit::Data, error))?;
         let marker = input.vehicle.vehicle.reference.map(|reference| reference.marker);
         let (references, body_from_marker) = match reference {
             Reference::None => return Ok(Self::without("there is no reference")),
@@ -81,7 +78,7 @@ impl Comparison {
             }
         };
         format!(
-            "Medians over {} windows of {:.3} m, {aligned}; at the end of the run, aligned at its \
+            "Medians over {} windows of {:.2} m, {aligned}; at the end of the run, aligned at its \
              beginning, odometry minus reference along the axes of the reference's frame. Largest \
              of a window: {:.2} %. The reference's own noise is in these figures.",
             drift.windows, drift.window, drift.position_percent_max
@@ -100,14 +97,21 @@ impl Comparison {
         };
         let model = OdometryModel::from_code(newest.model).unwrap_or(OdometryModel::None);
         notes.extend(sensing::lacks(model, &input.sensors));
-        notes.extend(lost(track, newest));
-        notes.extend(gated(newest));
+        notes.extend(caution(track));
         if newest.unusable > 0 {
-            notes.push(format!("{} travels had no usable wheels", newest.unusable));
+            let travels = if newest.unusable == 1 { "travel" } else { "travels" };
+            notes.push(format!("{} {travels} without usable wheels", newest.unusable));
         }
         notes.extend(by_hand(input, track));
         notes
     }
+}
+
+/// What of the odometry must not be overlooked.
+pub fn caution(track: &Track) -> Option<String> {
+    let newest = track.newest.as_ref()?;
+    let said: Vec<_> = lost(track, newest).into_iter().chain(gated(newest)).collect();
+    (!said.is_empty()).then(|| said.join("; ") + ".")
 }
 
 /// Seconds of the drive at `stamp`.
@@ -126,7 +130,7 @@ fn lost(track: &Track, newest: &Odometry) -> Option<String> {
         _ => "was lost",
     };
     Some(format!(
-        "the pose {ended}: from {at:.2} s on ({reason}) motion is missing that no wheel tells of"
+        "The pose {ended}: from {at:.2} s on ({reason}) motion is missing that no wheel tells of"
     ))
 }
 
@@ -135,7 +139,7 @@ fn gated(newest: &Odometry) -> Option<String> {
     let share = refused / (taken + refused);
     (share > MANY_GATED).then(|| {
         format!(
-            "{:.0} % of the corrections were refused by the gate: front and rear wheels do not \
+            "{:.0}\u{202f}% of the corrections were refused by the gate: front and rear wheels do not \
              agree with each other or with the steering angle",
             100.0 * share
         )

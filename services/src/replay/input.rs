@@ -45,9 +45,11 @@ impl Input {
     /// # Errors
     /// [`Failure`] with the reason, and the place where there is one.
     pub fn open(source: &Source, vehicle: Option<&str>) -> Result<Self, Failure> {
-        let drive = RawInput::open_as(source, vehicle.map(vehicle_text).transpose()?).map_err(refused)?;
+        let drive =
+            RawInput::open_as(source, vehicle.map(vehicle_text).transpose()?).map_err(refused)?;
         let text = drive.vehicle();
-        let parsed = parse_vehicle(&text.origin.display().to_string(), &text.text).map_err(refused_text)?;
+        let parsed =
+            parse_vehicle(&text.origin.display().to_string(), &text.text).map_err(refused_text)?;
         let raws: Vec<Raw> = drive.raws().and_then(Iterator::collect).map_err(refused)?;
         let carried = Carried::by(&raws);
         let vehicle = parsed.value;
@@ -80,7 +82,10 @@ pub fn only_source(path: &Path) -> Result<Source, Failure> {
 /// [`Failure`] where there is none.
 pub fn find(path: &Path) -> Result<Vec<Source>, Failure> {
     if !path.exists() {
-        return Err(Failure::new(Exit::Data, format!("{}: no such file or folder", path.display())));
+        return Err(Failure::new(
+            Exit::Data,
+            format!("{}: no such file or folder", path.display()),
+        ));
     }
     sources(path).map_err(refused)
 }
@@ -131,7 +136,9 @@ fn vehicle_text(reference: &str) -> Result<VehicleText, Failure> {
 
 fn refused(error: InputError) -> Failure {
     match error {
-        InputError::Run(kerbside_recordings::run_folder::RunError::About(error)) => refused_text(error),
+        InputError::Run(kerbside_recordings::run_folder::RunError::About(error)) => {
+            refused_text(error)
+        }
         error => Failure::new(Exit::Data, error),
     }
 }

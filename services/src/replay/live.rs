@@ -118,7 +118,10 @@ fn watch(
             return End::Failed(why);
         }
         if now() > heard + STALL + schedule.longest {
-            return End::Failed(format!("no more odometry after {} of {expected}", live.track.len()));
+            return End::Failed(format!(
+                "no more odometry after {} of {expected}",
+                live.track.len()
+            ));
         }
     }
 }
@@ -234,7 +237,9 @@ impl Desk {
         let mut said = Vec::new();
         if let Some(row) = row {
             let words = text::as_str(&row.waiting_for);
-            said.extend((row.restarts > 0).then(|| "recorder died: the recording has a hole".to_owned()));
+            said.extend(
+                (row.restarts > 0).then(|| "recorder died: the recording has a hole".to_owned()),
+            );
             said.extend((!words.is_empty()).then(|| format!("recorder: {words}")));
         }
         said

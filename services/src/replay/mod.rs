@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use kerbside_messages::Process;
+use kerbside_messages::{Process, Raw};
 use kerbside_recordings::input::Source;
 use kerbside_runtime::Instance;
 
@@ -67,7 +67,6 @@ pub struct ReplayArgs {
 struct Job {
     service: Service,
     input: Input,
-    folder: PathBuf,
     command_line: String,
     /// When its input began to be read.
     begun: Instant,
@@ -75,13 +74,40 @@ struct Job {
 
 /// Drive time over processing time.
 #[derive(Clone, Copy, Debug)]
-struct Speeds {
+pub struct Speeds {
     /// Everything from opening the files to the hash, in one process.
-    files: f64,
+    pub files: f64,
     /// The stages and the checks between them, the readings being in memory.
-    memory: f64,
+    pub memory: f64,
     /// From the first estimate to the last, through processes; none in one process.
-    live: Option<f64>,
+    pub live: Option<f64>,
+}
+
+/// How fast the drive at `path` goes through the stages in this process.
+///
+/// # Errors
+/// [`Failure`] where the input is refused.
+pub fn speeds_of(path: &Path) -> Result<Speeds, Failure> {
+    let name = Instance::fresh_name("bench");
+    let input = Some(path.to_owned());
+    let service_args = ServiceArgs { input, ..ServiceArgs::default() };
+    let service = Service::load(Process::Operator, &service_args, &name)?;
+    let begun = Instant::now();
+    let input = Input::open(&only_source(path)?, None)?;
+    let pure = pure::run(&service, &input.raws)?;
+    let hash = pure.track.sha256();
+    let wall = begun.elapsed().as_secs_f64();
+    tracing::info!(hash, "replayed");
+    let duration = duration_of(&input.raws);
+    Ok(Speeds { files: duration / wall, memory: duration / pure.seconds, live: None })
+}
+
+/// From the first reading to the last \[s\].
+fn duration_of(raws: &[Raw]) -> f64 {
+    match raws {
+        [first, .., last] => kerbside_messages::seconds(last.arrival.saturating_sub(first.arrival)),
+        _ => 0.0,
+    }
 }
 
 /// A drive that was replayed.
@@ -92,6 +118,8 @@ struct Finished {
     hash: String,
     /// Of the recorded drive \[s\].
     duration: f64,
+    /// What each wheel had rolled with each sample \[m\].
+    rolled: Vec<[f64; 4]>,
     refusals: Vec<(&'static str, u64)>,
     comparison: Comparison,
     speeds: Speeds,
@@ -145,10 +173,7 @@ fn path_of(source: &Source) -> &Path {
 fn run_one(args: &ReplayArgs, source: &Source, folder: &Path) -> Result<Finished, Failure> {
     let job = job(args, source, folder)?;
     let raws = &job.input.raws;
-    let duration = match &raws[..] {
-        [first, .., last] => kerbside_messages::seconds(last.arrival.saturating_sub(first.arrival)),
-        _ => 0.0,
-    };
+    let duration = duration_of(raws);
     let pure = pure::run(&job.service, raws)?;
     let hash = pure.track.sha256();
     let files = duration / job.begun.elapsed().as_secs_f64();
@@ -178,6 +203,7 @@ fn run_one(args: &ReplayArgs, source: &Source, folder: &Path) -> Result<Finished
         track,
         hash: heard,
         duration,
+        rolled: pure.rolled,
         refusals: pure.refusals,
         comparison,
         speeds,
@@ -214,8 +240,7 @@ fn job(args: &ReplayArgs, source: &Source, folder: &Path) -> Result<Job, Failure
     if !service.stack.recorder.enabled {
         service.args.recording = None;
     }
-    let folder = folder.to_owned();
-    Ok(Job { service, input, folder, command_line: command_line(args, source), begun })
+    Ok(Job { service, input, command_line: command_line(args, source), begun })
 }
 
 fn command_line(args: &ReplayArgs, source: &Source) -> String {

@@ -17,6 +17,8 @@ const BLOCK: usize = 1024;
 pub struct Pure {
     /// The odometry.
     pub track: Track,
+    /// What each wheel had rolled with each sample \[m\].
+    pub rolled: Vec<[f64; 4]>,
     /// What was refused, by reason.
     pub refusals: Vec<(&'static str, u64)>,
     /// Time spent in the stages and in the checks between them \[s\]; keeping and hashing what came of it is not in it.
@@ -30,14 +32,20 @@ pub struct Pure {
 pub fn run(service: &Service, raws: &[Raw]) -> Result<Pure, Failure> {
     let mut chain = Chain::new(service)?;
     let mut track = Track::with_capacity(raws.len());
+    let mut rolled = Vec::with_capacity(raws.len());
     let mut block: Vec<Odometry> = Vec::with_capacity(BLOCK);
     let mut seconds = 0.0;
     for raws in raws.chunks(BLOCK) {
         block.clear();
         let begun = Instant::now();
-        block.extend(raws.iter().filter_map(|raw| chain.step(raw)));
+        for raw in raws {
+            if let Some(odometry) = chain.step(raw) {
+                block.push(*odometry);
+                rolled.push(chain.rolled());
+            }
+        }
         seconds += begun.elapsed().as_secs_f64();
         block.iter().for_each(|odometry| track.push(odometry));
     }
-    Ok(Pure { track, refusals: chain.refusals(), seconds })
+    Ok(Pure { track, rolled, refusals: chain.refusals(), seconds })
 }

@@ -6,7 +6,7 @@ use kerbside_reports::{
     Drift, Gap, Model, Motion, Provenance, RefusalCount, ReplayReport, WheelTravel,
 };
 
-use super::comparison::{Comparison, time_of};
+use super::comparison::{Comparison, caution, time_of};
 use super::{Finished, sensing};
 
 /// The report of `one`.
@@ -17,6 +17,7 @@ pub fn of(one: &Finished) -> ReplayReport {
         vehicle: job.service.vehicle.name.clone(),
         mode: one.mode_in_words(),
         problem: one.problem.clone(),
+        caution: caution(&one.track),
         duration: one.duration,
         distance: one.track.distance(),
         samples: job.input.raws.len() as u64,
@@ -91,11 +92,10 @@ fn travel(one: &Finished) -> Vec<WheelTravel> {
     let track = &one.track;
     let read = WHEELS.into_iter().filter(|wheel| one.job.input.sensors.wheels[wheel.index()]);
     read.map(|wheel| {
-        let begin = track.travels.first().map_or(0.0, |travels| travels[wheel.index()]);
-        let point = |(pose, travels): (&kerbside_recordings::drift::EstimatedPose, &[f64; 4])| {
-            [time_of(track, pose.stamp), travels[wheel.index()] - begin]
+        let point = |(pose, rolled): (&kerbside_recordings::drift::EstimatedPose, &[f64; 4])| {
+            [time_of(track, pose.stamp), rolled[wheel.index()]]
         };
-        WheelTravel { wheel, points: track.poses.iter().zip(&track.travels).map(point).collect() }
+        WheelTravel { wheel, points: track.poses.iter().zip(&one.rolled).map(point).collect() }
     })
     .collect()
 }

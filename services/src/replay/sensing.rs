@@ -31,9 +31,8 @@ impl Carried {
         let wheels = if self.counts != 0 {
             let counted = vehicle.encoders.is_some();
             let read = wheels_of(self.counts);
-            let both = core::array::from_fn(|index| {
-                counted && described.wheels[index] && read[index]
-            });
+            let both =
+                core::array::from_fn(|index| counted && described.wheels[index] && read[index]);
             Sensors { wheels: both, signal: WheelSignal::Counts, ..described }
         } else {
             described.with_speeds(wheels_of(self.speeds))
@@ -58,7 +57,9 @@ impl Carried {
                 said.push(format!("{wheels}: an encoder is described, but was never read"));
             }
             if let Some(wheels) = only(&read, &described.wheels) {
-                said.push(format!("{wheels}: counts are not used, vehicle.toml has no counts_per_revolution"));
+                said.push(format!(
+                    "{wheels}: counts are not used, vehicle.toml has no counts_per_revolution"
+                ));
             }
         }
         for (name, key, described, carried) in [

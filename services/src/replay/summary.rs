@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use super::report::model_of;
 use super::{Finished, Outcome, ReplayArgs, sensing};
-use crate::exit::Exit;
+use crate::exit::{Exit, Failure};
 
 /// Tells what came of one drive.
 pub fn tell_one(args: &ReplayArgs, one: &Finished) -> Exit {
@@ -57,7 +57,7 @@ fn with_common(mut object: Value, passed: bool) -> Value {
 fn outcome_as_json(outcome: &Outcome) -> Value {
     match &outcome.result {
         Ok(one) => one_as_json(one),
-        Err(failure) => json!({ "input": outcome.input, "refused": failure.report.to_string() }),
+        Err(failure) => json!({ "input": outcome.input, "refused": words(failure) }),
     }
 }
 
@@ -133,14 +133,20 @@ fn print_one(one: &Finished) {
     }
     if let Ok(drift) = &one.comparison.drift {
         let percent = (drift.position_percent, drift.position_percent_max);
-        row("position drift", format!("{:.2} % of distance, at most {:.2} %", percent.0, percent.1));
+        row(
+            "position drift",
+            format!("{:.2} % of distance, at most {:.2} %", percent.0, percent.1),
+        );
         row("heading drift", format!("{} rad/m", significant(drift.heading_rad_per_m)));
         row("windows", format!("{} of {:.2} m", drift.windows, drift.window));
         row("end error", end_in_words(one));
     }
     let newest = one.track.newest.unwrap_or_default();
     if newest.corrections + newest.gated > 0 {
-        row("corrections", format!("{} taken, {} refused by the gate", newest.corrections, newest.gated));
+        row(
+            "corrections",
+            format!("{} taken, {} refused by the gate", newest.corrections, newest.gated),
+        );
     }
     row("pose", state_of(one).to_owned());
     row("speed", speeds_in_words(one));
@@ -193,21 +199,47 @@ fn print_many(folder: &Path, outcomes: &[Outcome]) {
         table.add_row(row_of(outcome));
     }
     println!("{table}");
-    for outcome in outcomes {
-        if let Ok(one) = &outcome.result {
-            let name = one.job.input.drive.name();
-            one.problem.iter().for_each(|problem| println!("{name}: not replayed: {problem}"));
-            one.notes.iter().for_each(|note| println!("{name}: {note}"));
-        }
+    for one in finished(outcomes) {
+        let name = one.job.input.drive.name();
+        one.problem.iter().for_each(|problem| println!("{name}: not replayed: {problem}"));
+    }
+    for (note, names) in grouped_notes(outcomes) {
+        let all = names.len() == finished(outcomes).count();
+        println!("{}: {note}", if all { "all".to_owned() } else { names.join(", ") });
     }
     println!("reports    {}", folder.display());
+}
+
+fn finished(outcomes: &[Outcome]) -> impl Iterator<Item = &Finished> {
+    outcomes.iter().filter_map(|outcome| outcome.result.as_deref().ok())
+}
+
+/// Each note once, with the runs it is of.
+fn grouped_notes(outcomes: &[Outcome]) -> Vec<(&str, Vec<&str>)> {
+    let mut grouped: Vec<(&str, Vec<&str>)> = Vec::new();
+    for one in finished(outcomes) {
+        let name = one.job.input.drive.name();
+        for note in &one.notes {
+            match grouped.iter_mut().find(|(known, _)| *known == note.as_str()) {
+                Some((_, names)) => names.push(name),
+                None => grouped.push((note, vec![name])),
+            }
+        }
+    }
+    grouped
+}
+
+/// A refusal in one line: what the report says, with the place of each problem.
+fn words(failure: &Failure) -> String {
+    let problems = failure.report.related().into_iter().flatten().map(ToString::to_string);
+    core::iter::once(failure.report.to_string()).chain(problems).collect::<Vec<_>>().join("; ")
 }
 
 fn row_of(outcome: &Outcome) -> Vec<String> {
     let name = outcome.input.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let one = match &outcome.result {
         Ok(one) => one,
-        Err(failure) => return vec![name, format!("refused: {}", failure.report)],
+        Err(failure) => return vec![name, format!("refused: {}", words(failure))],
     };
     let drift = one.comparison.drift.as_ref().ok();
     let known = |value: Option<String>| value.unwrap_or_else(|| "-".to_owned());

@@ -44,8 +44,6 @@ pub struct Track {
     pub poses: Vec<EstimatedPose>,
     /// Speed and steering angle with each pose \[m/s, rad\].
     pub motions: Vec<[f64; 2]>,
-    /// Travel of each wheel with each pose \[m\].
-    pub travels: Vec<[f64; 4]>,
     /// Stretches without readings.
     pub gaps: Vec<Stretch>,
     /// When the pose was lost for the first time.
@@ -61,7 +59,6 @@ impl Track {
         Self {
             poses: Vec::with_capacity(samples),
             motions: Vec::with_capacity(samples),
-            travels: Vec::with_capacity(samples),
             ..Self::default()
         }
     }
@@ -74,7 +71,6 @@ impl Track {
         self.take_gap(odometry);
         self.poses.push(EstimatedPose { stamp, pose, distance: odometry.distance });
         self.motions.push([odometry.speed, odometry.steering]);
-        self.travels.push(odometry.travel);
         if odometry.state == EstimatorState::Lost.code() {
             self.lost.get_or_insert(stamp);
         }

@@ -11,7 +11,7 @@ use core::time::Duration;
 use std::collections::BTreeMap;
 
 use kerbside_messages::{Mode, OperatorAnswer, OperatorRequest, Process, Verb};
-use kerbside_runtime::{Asked, FileLock, Services, kill, now};
+use kerbside_runtime::{Asked, FileLock, Services, Ticker, kill, now};
 use kerbside_safety::{Action, Actions, Event, Supervised, Supervisor, bounds};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::MissedTickBehavior;
@@ -24,6 +24,8 @@ use sweeper::Sweeper;
 
 /// Longest wait for what an earlier life left to end.
 const LEFTOVERS: Duration = Duration::from_secs(2);
+/// Time between looks whether it did.
+const LOOK: Duration = Duration::from_millis(1);
 
 /// Runs the supervisor of `service`'s instance until it is told to end.
 ///
@@ -52,15 +54,20 @@ fn end_leftovers(service: &Service) -> Result<(), Failure> {
     for process in Process::SUPERVISED {
         let path = service.instance.process_lock(process);
         let external = service.is_external(process);
+        let mut look = Ticker::new(LOOK);
+        let mut said = None;
         while let Some(pid) = FileLock::holder(&path).filter(|_| !external) {
-            tracing::warn!(%process, pid, "ending what an earlier supervisor left");
+            if said != Some(pid) {
+                tracing::warn!(%process, pid, "ending what an earlier supervisor left");
+                said = Some(pid);
+            }
             kill(pid);
             if now() > deadline {
                 return Err(Failure::unavailable(format!(
                     "{process} (pid {pid}) of an earlier life does not end"
                 )));
             }
-            std::thread::yield_now();
+            look.wait();
         }
     }
     Ok(())

@@ -116,10 +116,27 @@ impl<M: Message> Admission<M> {
     /// # Errors
     /// The first check that fails.
     pub fn admit(&mut self, message: &M, tail: &[u8], now: Nanos) -> Result<Admitted, Refusal> {
-        self.judge(message, tail, now).inspect_err(|refusal| {
-            self.counts.by_reason[refusal.index()] += 1;
-            self.counts.newest = Some(*refusal);
-        })
+        self.judge(message, tail, now).inspect_err(|refusal| self.count(*refusal))
+    }
+
+    /// The same for a sample that never leaves its process, as number `sequence` of `epoch`: what a seal proves of
+    /// the way is not asked, and nobody needs to seal it.
+    ///
+    /// # Errors
+    /// The first check that fails.
+    pub fn admit_unsealed(
+        &mut self,
+        message: &M,
+        epoch: u64,
+        sequence: u64,
+    ) -> Result<Admitted, Refusal> {
+        let judged = message.validate().and_then(|()| self.place(epoch, sequence));
+        judged.inspect_err(|refusal| self.count(*refusal))
+    }
+
+    fn count(&mut self, refusal: Refusal) {
+        self.counts.by_reason[refusal.index()] += 1;
+        self.counts.newest = Some(refusal);
     }
 
     /// What was refused so far.
@@ -143,10 +160,14 @@ impl<M: Message> Admission<M> {
             return Err(Refusal::Future);
         }
         message.validate()?;
+        self.place(header.epoch, header.sequence)
+    }
+
+    fn place(&mut self, epoch: u64, sequence: u64) -> Result<Admitted, Refusal> {
         if !matches!(M::TOPIC.publisher, Publisher::One(_)) {
             return Ok(Admitted { missing: 0, new_epoch: false });
         }
-        self.order(header.epoch, header.sequence)
+        self.order(epoch, sequence)
     }
 
     fn order(&mut self, epoch: u64, sequence: u64) -> Result<Admitted, Refusal> {
@@ -206,6 +227,23 @@ mod tests {
         assert_eq!(admission.admit(&sample(1, 9), &[], 10), Err(Refusal::Epoch));
         assert_eq!(admission.counts().lost, 2);
         assert_eq!(admission.counts().total(), 2);
+    }
+
+    #[test]
+    fn a_sample_that_needs_no_seal_is_judged_as_a_sealed_one() {
+        let places = [(1, 5), (1, 5), (1, 8), (2, 1), (1, 9), (2, 2)];
+        let contents = [Raw::default(), Raw { yaw_rate: f64::NAN, ..Raw::default() }];
+        let (mut sealed, mut unsealed) = (Admission::<Raw>::default(), Admission::default());
+        for (epoch, sequence) in places {
+            for content in &contents {
+                let mut raw = *content;
+                seal(&mut raw, &[], epoch, sequence, 10);
+                let judged = sealed.admit(&raw, &[], 10);
+                assert_eq!(unsealed.admit_unsealed(content, epoch, sequence), judged);
+            }
+        }
+        assert_eq!(unsealed.counts(), sealed.counts());
+        assert!(sealed.counts().lost > 0 && sealed.counts().total() > 6);
     }
 
     #[test]

@@ -61,6 +61,11 @@ impl Ticker {
         true
     }
 
+    /// Counts the next tick from `now`: what it is for was done just now.
+    pub fn restart(&mut self, now: Nanos) {
+        self.next = now + self.period;
+    }
+
     /// Sleeps until the next tick is due, and sets the one after it.
     pub fn wait(&mut self) {
         loop {
@@ -89,5 +94,7 @@ mod tests {
         assert_eq!(ticker.next(), 110);
         assert!(ticker.due(135));
         assert_eq!((ticker.next(), ticker.overruns()), (145, 1));
+        ticker.restart(138);
+        assert!(!ticker.due(147) && ticker.due(148));
     }
 }

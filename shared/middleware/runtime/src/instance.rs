@@ -15,7 +15,10 @@ pub const MAX_NAME: usize = 24;
 /// Bytes that a Unix socket's path may have; the middleware puts its sockets below the root.
 const SOCKET_PATH: usize = 107;
 /// Bytes that the middleware's socket names need behind the root: a slash, prefix, number and suffix.
-const SOCKET_NAME: usize = 1 + 11 + 39 + 6;
+const SOCKET_NAME: usize = 1 + 15 + 39 + 6;
+
+/// How the line of the prefix begins in the middleware's configuration.
+const PREFIX_KEY: &str = "prefix = \"";
 
 /// Why an instance cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -143,8 +146,8 @@ impl Instance {
         self.folder.join(format!("{}.pid", process.name()))
     }
 
-    /// The prefix of everything of this instance in shared memory: made from the folder, so that two users and two
-    /// run-time folders never share one.
+    /// How everything of this instance begins in shared memory: made from the folder, so that two users and two
+    /// run-time folders never share it.
     #[must_use]
     pub fn prefix(&self) -> String {
         // FNV-1a, 32 bit: short, and equal in every build.
@@ -156,7 +159,25 @@ impl Instance {
             .fold(0x811c_9dc5_u32, |hash, byte| {
                 (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193)
             });
-        format!("kb{hash:08x}_")
+        format!("kb{hash:08x}")
+    }
+
+    /// A prefix for one life of the instance, from its supervisor's start to its end. Who still holds services of an
+    /// ended life removes them by name when it lets go: they must not be those of the next life.
+    fn new_life(&self) -> String {
+        let milliseconds = crate::now() / 1_000_000;
+        format!("{}{:04x}_", self.prefix(), milliseconds & 0xffff)
+    }
+
+    /// The prefix of the present life; none where the instance has not been set up.
+    fn life(&self) -> Result<Option<String>, InstanceError> {
+        let path = self.configuration();
+        let text = match fs::read_to_string(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            other => other.map_err(|source| InstanceError::File { path, source })?,
+        };
+        let prefix = text.lines().find_map(|line| line.strip_prefix(PREFIX_KEY)?.strip_suffix('"'));
+        Ok(prefix.map(str::to_owned))
     }
 
     /// Makes the folder, for this user alone.
@@ -227,6 +248,18 @@ impl Instance {
         remove_folder(&self.folder)
     }
 
+    /// The last one out: removes everything of an instance that has neither a supervisor nor any other process.
+    ///
+    /// # Errors
+    /// [`InstanceError::File`].
+    pub fn remove_if_deserted(&self) -> Result<(), InstanceError> {
+        let Some(_blocked) = FileLock::block(&self.process_lock(Process::Supervisor)) else {
+            return Ok(());
+        };
+        let lives = |process| FileLock::holder(&self.process_lock(process)).is_some();
+        if Process::ALL.into_iter().any(lives) { Ok(()) } else { self.remove() }
+    }
+
     /// Writes the middleware's configuration for the instance's processes.
     ///
     /// # Errors
@@ -236,31 +269,33 @@ impl Instance {
         let wrap = |source| InstanceError::File { path: path.clone(), source };
         fs::create_dir_all(self.root()).map_err(wrap)?;
         let text = format!(
-            "[global]\nroot-path = \"{}\"\nprefix = \"{}\"\n",
+            "[global]\nroot-path = \"{}\"\n{PREFIX_KEY}{}\"\n",
             self.root().display(),
-            self.prefix()
+            self.new_life()
         );
         // Written beside and renamed: who finds it finds all of it.
         let part = self.folder.join("iox.toml.part");
         fs::write(&part, text).and_then(|()| fs::rename(&part, &path)).map_err(wrap)
     }
 
-    /// The middleware's configuration: root and prefix of this instance; only the supervisor sweeps dead nodes.
-    pub(crate) fn middleware_config(&self) -> Result<Config, InstanceError> {
+    /// The middleware's configuration: root and prefix of the instance's present life; only the supervisor sweeps dead
+    /// nodes. None where the instance has not been set up.
+    pub(crate) fn middleware_config(&self) -> Result<Option<Config>, InstanceError> {
         let wrap = |what: &str| InstanceError::File {
             path: self.folder.clone(),
             source: std::io::Error::other(format!("no path for the middleware: {what}")),
         };
+        let Some(prefix) = self.life()? else { return Ok(None) };
         let mut config = Config::default();
         let root = self.root();
         let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes());
         config.global.set_root_path(&root.map_err(|error| wrap(&format!("{error:?}")))?);
         config.global.prefix =
-            FileName::new(self.prefix().as_bytes()).map_err(|error| wrap(&format!("{error:?}")))?;
+            FileName::new(prefix.as_bytes()).map_err(|error| wrap(&format!("{error:?}")))?;
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
-        Ok(config)
+        Ok(Some(config))
     }
 
     /// Every instance of this user that has a supervisor, with its supervisor's pid.
@@ -324,7 +359,7 @@ mod tests {
         let one = Instance::below(Path::new("/tmp/a"), "x").unwrap();
         let two = Instance::below(Path::new("/tmp/b"), "x").unwrap();
         assert_ne!(one.prefix(), two.prefix());
-        assert_eq!(one.prefix().len(), 11);
+        assert_eq!(one.prefix().len(), 10);
     }
 
     #[test]

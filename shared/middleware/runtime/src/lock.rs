@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 use rustix::fs::{FlockOperation, flock};
@@ -50,19 +50,42 @@ impl FileLock {
     /// [`LockError::Held`] where another process has it, [`LockError::File`] where the file cannot be used.
     pub fn take(path: &Path) -> Result<Self, LockError> {
         let wrap = |source| LockError::File { path: path.to_owned(), source };
-        let mut file = open(path).map_err(wrap)?;
         let mut pause = Ticker::new(PAUSE);
         let mut attempts = 1;
-        while flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
+        let mut file = loop {
+            let mut file = open(path).map_err(wrap)?;
+            let locked = flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok();
+            // Its last owner may have removed the file meanwhile: nobody would see a lock on that.
+            if locked && is_at(&file, path) {
+                break file;
+            }
             if attempts == ATTEMPTS {
                 return Err(LockError::Held { path: path.to_owned(), pid: pid_in(&mut file) });
             }
             attempts += 1;
             pause.wait();
-        }
+        };
         file.set_len(0).map_err(wrap)?;
         file.write_all(std::process::id().to_string().as_bytes()).map_err(wrap)?;
         Ok(Self { file, path: path.to_owned() })
+    }
+
+    /// Holds the lock at `path` without becoming its owner: nobody takes it meanwhile. None where it has an owner, or
+    /// there is none.
+    #[must_use]
+    pub fn block(path: &Path) -> Option<File> {
+        let mut pause = Ticker::new(PAUSE);
+        for _ in 0..ATTEMPTS {
+            let mut file = OpenOptions::new().read(true).open(path).ok()?;
+            if flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok() {
+                return is_at(&file, path).then_some(file);
+            }
+            if pid_in(&mut file) != 0 {
+                return None;
+            }
+            pause.wait();
+        }
+        None
     }
 
     /// The pid of the process that holds the lock at `path`; none where nobody does.
@@ -87,6 +110,12 @@ impl Drop for FileLock {
         // The pid goes before the lock does, so that nobody reads a pid that may be somebody else's by then.
         let _ = self.file.set_len(0);
     }
+}
+
+fn is_at(file: &File, path: &Path) -> bool {
+    let identity = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+    let there = std::fs::metadata(path).map(identity).ok();
+    there.is_some() && there == file.metadata().map(identity).ok()
 }
 
 fn open(path: &Path) -> std::io::Result<File> {
@@ -116,6 +145,38 @@ mod tests {
         drop(lock);
         assert_eq!(FileLock::holder(&path), None);
         FileLock::take(&path).unwrap();
+    }
+
+    #[test]
+    fn a_blocked_lock_is_nobodys_and_a_removed_one_counts_no_more() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.lock");
+        assert!(FileLock::block(&path).is_none(), "there is none yet");
+        drop(FileLock::take(&path).unwrap());
+        let blocked = FileLock::block(&path).unwrap();
+        assert_eq!(FileLock::holder(&path), None);
+        assert!(matches!(FileLock::take(&path), Err(LockError::Held { pid: 0, .. })));
+        let waiting = std::thread::spawn({
+            let path = path.clone();
+            move || FileLock::take(&path).map(|lock| is_at(&lock.file, &path))
+        });
+        std::fs::remove_file(&path).unwrap();
+        drop(blocked);
+        assert!(waiting.join().unwrap().unwrap(), "took a lock that counts no more");
+    }
+
+    #[test]
+    fn a_lock_on_a_removed_file_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.lock");
+        std::thread::scope(|scope| {
+            let first = FileLock::take(&path).unwrap();
+            let second = scope.spawn(|| FileLock::take(&path));
+            std::fs::remove_file(&path).unwrap();
+            drop(first);
+            let _second = second.join().unwrap().unwrap();
+            assert_eq!(FileLock::holder(&path), Some(std::process::id()), "all see it");
+        });
     }
 
     #[test]

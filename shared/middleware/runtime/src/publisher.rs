@@ -8,7 +8,7 @@ use kerbside_messages::{Message, Plan, TrajectoryPoint, seal};
 use crate::error::{Context, RuntimeError};
 use crate::now;
 use crate::wait::Notifier;
-use crate::wire::{Wire, WirePoint, points};
+use crate::wire::{Wire, WirePoint, points, wired};
 
 /// Publishes `M`, written in place in shared memory.
 pub struct Publisher<M: Message> {
@@ -90,7 +90,7 @@ impl PlanPublisher {
     /// [`RuntimeError`] where no memory can be loaned: more points than a plan may have, or the send failed.
     pub fn send(&mut self, head: &Plan, plan: &[TrajectoryPoint]) -> Result<(), RuntimeError> {
         let loan = self.port.loan_slice_uninit(plan.len()).context("loan", Plan::TOPIC.name)?;
-        let mut sample = loan.write_from_fn(|index| WirePoint(plan[index]));
+        let mut sample = loan.write_from_slice(wired(plan));
         self.sequence += 1;
         let mut sealed = *head;
         let tail = bytemuck::cast_slice(points(sample.payload()));

@@ -74,6 +74,7 @@ impl Services {
     /// [`SessionError`] where the middleware cannot list them.
     pub fn nodes(instance: &Instance) -> Result<(usize, usize), SessionError> {
         let config = instance.middleware_config()?;
+        let config = config.ok_or_else(|| SessionError::no_supervisor(instance))?;
         let (mut alive, mut dead) = (0, 0);
         Node::<ipc::Service>::list(&config, |node| {
             match node {

@@ -50,6 +50,11 @@ pub enum SessionError {
 }
 
 impl SessionError {
+    /// Nobody has set the instance up.
+    pub(crate) fn no_supervisor(instance: &Instance) -> Self {
+        Self::Missing { what: "the supervisor".to_owned(), instance: instance.name().to_owned() }
+    }
+
     /// Whether waiting may help.
     #[must_use]
     pub fn is_missing(&self) -> bool {
@@ -85,16 +90,15 @@ impl Session {
     /// [`SessionError::Missing`] as long as no supervisor has set the instance up.
     pub fn join(instance: &Instance, process: Process) -> Result<Self, SessionError> {
         // What a supervisor that was killed left behind is no instance, until the next one has swept it away.
-        if instance.supervisor().is_none() || !instance.configuration().exists() {
-            return Err(SessionError::Missing {
-                what: "the supervisor".to_owned(),
-                instance: instance.name().to_owned(),
-            });
+        if instance.supervisor().is_none() {
+            return Err(SessionError::no_supervisor(instance));
         }
         Self::start(instance, process)
     }
 
     pub(crate) fn start(instance: &Instance, process: Process) -> Result<Self, SessionError> {
+        let config = instance.middleware_config()?;
+        let config = config.ok_or_else(|| SessionError::no_supervisor(instance))?;
         let file = instance.configuration();
         let file = FilePath::new(file.as_os_str().as_encoded_bytes())
             .context("name configuration", "all")?;
@@ -103,7 +107,7 @@ impl Session {
         let name = NodeName::new(process.name()).context("name node", "all")?;
         let node = NodeBuilder::new()
             .name(&name)
-            .config(&instance.middleware_config()?)
+            .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .context("create node", "all")?;

@@ -36,3 +36,9 @@ pub(crate) fn points(wired: &[WirePoint]) -> &[TrajectoryPoint] {
     // SAFETY: `WirePoint` is `repr(transparent)` over `TrajectoryPoint`, so slices of both have one layout.
     unsafe { core::slice::from_raw_parts(wired.as_ptr().cast(), wired.len()) }
 }
+
+/// Points as they are transported; the way back from [`points`].
+pub(crate) fn wired(points: &[TrajectoryPoint]) -> &[WirePoint] {
+    // SAFETY: as for `points`: `WirePoint` is `repr(transparent)` over `TrajectoryPoint`.
+    unsafe { core::slice::from_raw_parts(points.as_ptr().cast(), points.len()) }
+}

@@ -121,7 +121,7 @@ pub enum DriftError {
     #[error("estimate and reference have no time in common")]
     Apart,
     /// The car hardly moved on.
-    #[error("rolled {distance} m only: a drift per distance needs at least {SHORTEST} m")]
+    #[error("rolled {distance:.3} m only: a drift per distance needs at least {SHORTEST} m")]
     Short {
         /// Distance \[m\].
         distance: f64,

@@ -2,7 +2,7 @@
 
 use kerbside_geometry::Pose;
 
-use super::data::{EstimateSample, ParkReport};
+use super::data::{EstimateSample, ParkReport, Plan};
 use super::errors::ellipse;
 use crate::Motion;
 use crate::format;
@@ -103,15 +103,19 @@ impl ParkReport {
         }
     }
 
+    /// Those of a plan that another one replaced were driven only up to there.
     fn draw_gear_changes(&self, map: &mut Map) {
-        let cusps = self.plans.iter().flat_map(|plan| {
-            segments(&plan.points)
-                .windows(2)
-                .map(|pair| plan.points[pair[1].0].pose)
-                .collect::<Vec<_>>()
-        });
-        for (index, pose) in cusps.enumerate() {
-            map.number([pose.x, pose.y], index + 1, Ink::Blue);
+        let begin = |plan: &Plan| plan.points.first().map(|point| point.time);
+        let mut number = 0;
+        for (index, plan) in self.plans.iter().enumerate() {
+            let end = self.plans.get(index + 1).and_then(begin).unwrap_or(f64::INFINITY);
+            for pair in segments(&plan.points).windows(2) {
+                let cusp = plan.points[pair[1].0];
+                if cusp.time < end {
+                    number += 1;
+                    map.number([cusp.pose.x, cusp.pose.y], number, Ink::Blue);
+                }
+            }
         }
     }
 

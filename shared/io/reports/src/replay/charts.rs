@@ -154,6 +154,7 @@ mod tests {
             vehicle: String::new(),
             mode: String::new(),
             problem: None,
+            caution: None,
             duration: 1.0,
             distance: 2.0,
             samples: 2,

@@ -16,6 +16,8 @@ pub struct ReplayReport {
     pub mode: String,
     /// Why it was refused or ended badly; none: it went through.
     pub problem: Option<String>,
+    /// What of the odometry must not be overlooked, a sentence.
+    pub caution: Option<String>,
     /// Duration of the drive \[s\].
     pub duration: f64,
     /// Distance rolled, both directions added \[m\].

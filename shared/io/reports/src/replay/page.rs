@@ -52,9 +52,10 @@ impl ReplayReport {
                 )
             },
         );
-        let (tone, headline, sentence) = match &self.problem {
-            Some(problem) => (Tone::Bad, "Not replayed.", problem.clone()),
-            None => (Tone::Good, "Replayed.", drift),
+        let (tone, headline, sentence) = match (&self.problem, &self.caution) {
+            (Some(problem), _) => (Tone::Bad, "Not replayed.", problem.clone()),
+            (None, Some(caution)) => (Tone::Warn, "Replayed.", format!("{drift} {caution}")),
+            (None, None) => (Tone::Good, "Replayed.", drift),
         };
         Verdict { tone, headline: headline.to_owned(), sentence }
     }

@@ -420,6 +420,7 @@ pub(crate) fn replayed() -> ReplayReport {
         vehicle: "delivery van".to_owned(),
         mode: "through running processes at 20 times real time".to_owned(),
         problem: None,
+        caution: None,
         duration: 120.0,
         distance: rolled,
         samples: 12_000,

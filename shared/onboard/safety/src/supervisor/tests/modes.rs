@@ -126,6 +126,20 @@ fn an_inhibit_stops_to_ready_and_forbids_the_arm_while_in_force() {
 
 #[test]
 fn the_gates_own_word_of_an_inhibit_ends_in_ready_as_well() {
+    let mut world = told_by_the_gate();
+    world.run_until(3_000, |world| world.mode() == Mode::Ready);
+    assert_eq!(world.supervisor.cause(), Cause::Inhibited);
+}
+
+#[test]
+fn an_inhibit_that_comes_after_the_gates_word_says_why() {
+    let mut world = told_by_the_gate();
+    world.inhibit(5_000);
+    world.run_until(3_000, |world| world.mode() == Mode::Ready);
+    assert_eq!(text::as_str(&world.state().text), "inhibited by bumper: touched");
+}
+
+fn told_by_the_gate() -> World {
     let mut world = World::driving();
     let latched = kerbside_messages::Actuator {
         arm: 1,
@@ -133,8 +147,7 @@ fn the_gates_own_word_of_an_inhibit_ends_in_ready_as_well() {
         ..kerbside_messages::Actuator::default()
     };
     world.event(Event::Actuator(&latched));
-    world.run_until(3_000, |world| world.mode() == Mode::Ready);
-    assert_eq!(world.supervisor.cause(), Cause::Inhibited);
+    world
 }
 
 #[test]
