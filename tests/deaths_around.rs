@@ -54,7 +54,7 @@ fn park_without_its_supervisor(signal: Signal) {
     let stack = driving(&["--rearm"]);
     let (_, at) = stack.signal(Process::Supervisor, signal);
     let outcome = stack.end();
-    Halt::after(&outcome.seen, at).assert_in_time(&"supervisor lost");
+    Halt::after(&outcome.seen, at).assert_in_time("supervisor lost");
     assert_eq!(outcome.code, Some(1), "{outcome:?}");
     assert_eq!(outcome.cause(), "supervisor lost");
 }

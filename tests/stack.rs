@@ -339,7 +339,10 @@ fn two_stacks_drive_side_by_side() {
         let (one, two) = (scope.spawn(|| drive(&one)), scope.spawn(|| drive(&two)));
         (one.join().unwrap(), two.join().unwrap())
     });
-    assert_eq!((of_one.as_str(), of_two.as_str()), ("one: plan completed\n", "two: plan completed\n"));
+    assert_eq!(
+        (of_one.as_str(), of_two.as_str()),
+        ("one: plan completed\n", "two: plan completed\n")
+    );
     // One ends, the other stays.
     let [first, second] = stacks;
     must(&one, &["down"]);

@@ -39,10 +39,7 @@ fn to<W: for<'a> MakeWriter<'a> + 'static>(writer: W, level: &str) -> Builder<W>
         .or_else(|_| EnvFilter::try_new(level))
         .unwrap_or_else(|_| EnvFilter::new("info"));
     // An error of writing would be told by a panic. A car does not stop because nobody reads its log.
-    tracing_subscriber::fmt()
-        .log_internal_errors(false)
-        .with_env_filter(filter)
-        .with_writer(writer)
+    tracing_subscriber::fmt().log_internal_errors(false).with_env_filter(filter).with_writer(writer)
 }
 
 /// Writes the monotonic time, which all processes share, and the process's name.

@@ -98,6 +98,13 @@ impl Service {
         let mut stack = loaded.value;
         let sensors = match &args.input {
             Some(input) => take_input(&mut stack, args, input)?,
+            None if stack.interface == InterfaceSettings::Replay => {
+                return Err(Failure::with_help(
+                    Exit::Configuration,
+                    "interface.kind = \"replay\": nothing says what to replay",
+                    "kerbside replay PATH starts a stack of its own",
+                ));
+            }
             None => Sensors::of(&stack.vehicle),
         };
         let vehicle = stack.vehicle.clone();

@@ -20,10 +20,10 @@ pub(crate) mod observer;
 pub(crate) mod sandbox;
 pub(crate) mod stack;
 
-pub use disturbance::undisturbed;
-pub use observer::{OdometryLine, RowLine, Seen, StateLine, TruthLine};
-pub use sandbox::Sandbox;
-pub use stack::{Outcome, Signal, Stack};
+pub(crate) use disturbance::undisturbed;
+pub(crate) use observer::{OdometryLine, RowLine, Seen, StateLine, TruthLine};
+pub(crate) use sandbox::Sandbox;
+pub(crate) use stack::{Outcome, Signal, Stack};
 
 use core::time::Duration;
 

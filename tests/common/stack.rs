@@ -9,7 +9,7 @@ use kerbside_runtime::{FileLock, Instance, Ticker, now};
 use rustix::process::{Pid, kill_process};
 use serde_json::Value;
 
-pub use rustix::process::Signal;
+pub(crate) use rustix::process::Signal;
 
 use super::disturbance::end_if_stalled;
 use super::judging::ROLLING_OUT;

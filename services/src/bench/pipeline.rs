@@ -134,7 +134,15 @@ impl Drive {
         // The same name each time: a process takes part in one instance only.
         let name = Instance::fresh_name("bench");
         let mut command = super::own_executable();
-        command.args(["park", &args.scenario, "--headless", "--json", "--instance", &name]);
+        command.args([
+            "park",
+            &args.scenario,
+            "--headless",
+            "--rearm",
+            "--json",
+            "--instance",
+            &name,
+        ]);
         command.arg("--config").arg(&stack).arg("--out").arg(folder.join("out"));
         kerbside_runtime::close_inherited_on_exec();
         let park = command
@@ -161,6 +169,26 @@ impl Drive {
                 return Err(Failure::unavailable("the stack ended at its start"));
             }
             look.wait();
+        }
+    }
+}
+
+impl Drive {
+    /// Waits until the car drives; false when the manoeuvre is over. A car that a busy machine stops is armed again.
+    fn goes_on(&mut self, watch: &mut Watch, tick: &mut Ticker) -> Result<bool, Failure> {
+        let deadline = now() + START;
+        loop {
+            watch.take_in();
+            if watch.drives() {
+                return Ok(true);
+            }
+            if !matches!(self.park.try_wait(), Ok(None)) || watch.mode() == Some(Mode::Done) {
+                return Ok(false);
+            }
+            if now() > deadline {
+                return Err(Failure::unavailable("the car did not drive"));
+            }
+            tick.wait();
         }
     }
 }
@@ -203,8 +231,12 @@ impl Watch {
         core::iter::from_fn(|| self.command.receive()).map(latency).collect()
     }
 
+    fn mode(&self) -> Option<Mode> {
+        self.state.get().map(State::mode)
+    }
+
     fn drives(&self) -> bool {
-        self.state.get().is_some_and(|state| state.mode() == Mode::Driving)
+        self.mode() == Some(Mode::Driving)
     }
 
     fn pids(&self) -> Vec<(Process, u32)> {
@@ -239,28 +271,29 @@ fn measure(args: &PipelineArgs, scheduling: &Scheduling) -> Result<Measured, Fai
     let bare = create_bare(&session)?;
     let chain = Chain::start(&drive.instance, &scheduling.request)?;
     let chain_commands = BareSubscriber::<Command>::open(&session)?;
-    let deadline = now() + START;
     let mut tick = Ticker::new(WINDOW);
-    while !watch.drives() {
-        watch.take_in();
-        if now() > deadline || !matches!(drive.park.try_wait(), Ok(None)) {
-            return Err(Failure::unavailable("the car did not drive"));
-        }
-        tick.wait();
-    }
     let mut measured = Measured::default();
     for slice in 0..args.seconds {
+        if !drive.goes_on(&mut watch, &mut tick)? {
+            break;
+        }
         let beside = slice % 2 == 1;
         chain.feed(beside);
         tick.wait();
         watch.take_in();
         while chain_commands.receive().is_some() {}
-        if !watch.drives() {
-            break;
+        let slice = Slice::measure(&mut watch, &chain, &chain_commands, &mut tick);
+        // What was measured while a fault stopped the car says nothing of a car that drives.
+        if watch.drives() && !slice.latencies.is_empty() && slice.of_chain.is_empty() != beside {
+            measured.keep(beside, slice);
         }
-        measured.slice(beside, &mut watch, &chain, &chain_commands, &mut tick);
     }
     drop((chain, chain_commands, bare, watch, session));
+    if measured.chain.0.is_empty() || measured.alone.0.is_empty() {
+        return Err(Failure::unavailable(
+            "the manoeuvre was over before there was anything to compare",
+        ));
+    }
     Ok(measured)
 }
 
@@ -304,45 +337,56 @@ fn execution_time(pid: u32) -> Nanos {
         .unwrap_or(0)
 }
 
-impl Measured {
-    fn slice(
-        &mut self,
-        beside: bool,
+/// What a slice of time gave: latencies, and work per reading by process in each window.
+#[derive(Debug, Default)]
+struct Slice {
+    latencies: Vec<Nanos>,
+    of_chain: Vec<Nanos>,
+    work: Vec<Vec<f64>>,
+    work_of_chain: Vec<Vec<f64>>,
+}
+
+impl Slice {
+    fn measure(
         watch: &mut Watch,
         chain: &Chain,
         chain_commands: &BareSubscriber<Command>,
         tick: &mut Ticker,
-    ) {
+    ) -> Self {
         let (pids, chain_pids) = (watch.pids(), chain.pids());
         let account = |watch: &Watch| {
             (Account::of(&pids, watch.readings), Account::of(&chain_pids, chain.fed()))
         };
+        let mut slice = Self::default();
         let mut before = account(watch);
-        let (mut latencies, mut of_chain) = (Vec::new(), Vec::new());
         for _ in 0..SLICE - 1 {
             tick.wait();
-            latencies.extend(watch.take_in());
+            slice.latencies.extend(watch.take_in());
             let after = account(watch);
-            let ours = after.0.since(&before.0);
-            if beside {
-                let rivals = after.1.since(&before.1);
-                self.work.extend(ours.map(|each| each.iter().sum::<f64>()));
-                self.chain_work.extend(rivals.iter().map(|each| each.iter().sum::<f64>()));
-                self.by_place.extend(rivals);
-            } else {
-                self.by_process.extend(ours);
-            }
+            slice.work.extend(after.0.since(&before.0));
+            slice.work_of_chain.extend(after.1.since(&before.1));
             before = after;
             while let Some(command) = chain_commands.receive() {
-                of_chain.push(command.header.sent.saturating_sub(command.header.origin));
+                slice.of_chain.push(command.header.sent.saturating_sub(command.header.origin));
             }
         }
-        if beside {
-            self.beside.0.push(latencies);
-            self.chain.0.push(of_chain);
-        } else {
-            self.alone.0.push(latencies);
+        slice
+    }
+}
+
+impl Measured {
+    fn keep(&mut self, beside: bool, slice: Slice) {
+        if !beside {
+            self.alone.0.push(slice.latencies);
+            self.by_process.extend(slice.work);
+            return;
         }
+        let sum = |each: &Vec<f64>| each.iter().sum::<f64>();
+        self.beside.0.push(slice.latencies);
+        self.chain.0.push(slice.of_chain);
+        self.work.extend(slice.work.iter().map(sum));
+        self.chain_work.extend(slice.work_of_chain.iter().map(sum));
+        self.by_place.extend(slice.work_of_chain);
     }
 
     /// The pipeline's work per reading while it runs alone \[us\].

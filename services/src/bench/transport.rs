@@ -255,7 +255,9 @@ impl<'a> Bench<'a> {
         });
         let measured = self.interleave(&kinds, PLAN_GAP)?;
         let rival = Carrier::Bare.name();
-        told.rows.push(Row::of(subject.name(), subject.bytes(), &measured[0], rival, &measured[1]));
+        let row = Row::of(subject.name(), subject.bytes(), &measured[0], rival, &measured[1]);
+        told.figures.extend(row.figures(LIMIT_P50, Some(LIMIT_P99)));
+        told.rows.push(row);
         Ok(())
     }
 

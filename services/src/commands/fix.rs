@@ -10,6 +10,8 @@ use serde_json::json;
 use super::operator::{Desk, OperatorArgs};
 use crate::exit::{Exit, Failure};
 
+/// A fix can be read for so long at least: some rounds of the slowest reader.
+const LINGER: Duration = Duration::from_millis(100);
 /// Longest wait for an estimate \[s\].
 const PATIENCE: f64 = 1.0;
 
@@ -63,7 +65,10 @@ pub fn run(args: &FixArgs) -> Result<Exit, Failure> {
     let judged = |odometry: &Odometry| {
         odometry.resets != before.resets || odometry.fix_sequence != before.fix_sequence
     };
+    // The sample lives as long as its publisher: the recorder, which polls, has to find it too.
+    let mut lingering = Ticker::new(LINGER);
     let after = wait_for(&mut odometry, judged, "the estimator did not take up the fix")?;
+    lingering.wait();
     let verdict = FixVerdict::from_code(after.fix_verdict).unwrap_or(FixVerdict::None);
     let accepted = verdict == FixVerdict::Accepted;
     let more = json!({ "verdict": verdict.name() });

@@ -27,10 +27,7 @@ const WAIT: Duration = Duration::from_millis(10);
 /// [`Failure`] where the process cannot take part, or its input cannot be read.
 pub fn run(service: &Service) -> Result<Exit, Failure> {
     let Some(path) = &service.args.input else {
-        return Err(Failure::new(
-            Exit::Configuration,
-            "interface.kind = \"replay\": kerbside replay starts a stack of its own",
-        ));
+        return Err(Failure::internal("a replay without input"));
     };
     let input = Input::open(&only_source(path)?, service.args.vehicle.as_deref())?;
     let mut life = Life::join(service, 1)?;

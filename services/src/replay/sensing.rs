@@ -206,7 +206,7 @@ mod tests {
         assert_eq!(sensors.model(&car()), Ok(OdometryModel::Rear));
         let said = carried.disagreements(&car());
         assert!(said[0].starts_with("fl, fr: an encoder is described"), "{said:?}");
-        assert_eq!(said.len(), 3, "{said:?}");
+        assert_eq!(said.len(), 2, "{said:?}");
     }
 
     #[test]

@@ -70,7 +70,11 @@ impl ReplayReport {
         let end = drifted.map(|drift| math::hypot(drift.end_error.x, drift.end_error.y));
         let drift = drifted.map(|drift| drift.position_percent);
         vec![
-            KeyFigure::plain("Position drift", format::optional(drift, percent), "of the distance, median"),
+            KeyFigure::plain(
+                "Position drift",
+                format::optional(drift, percent),
+                "of the distance, median",
+            ),
             KeyFigure::plain("Heading drift", format::optional(heading, per_metre), "median"),
             KeyFigure::plain("End error", format::optional(end, format::metres), "position"),
             KeyFigure::plain("Distance", format::metres(self.distance), "both directions added"),
@@ -161,8 +165,7 @@ fn per_metre(radians: f64) -> String {
 fn drift_table(drift: &Drift) -> Table {
     let end = &drift.end_error;
     let length = |metres| format::with_unit(&format::signed(metres, 3), "m");
-    let columns =
-        ["#of the distance", "#heading per metre", "#end x", "#end y", "#end heading"];
+    let columns = ["#of the distance", "#heading per metre", "#end x", "#end y", "#end heading"];
     let row = Row::new([
         percent(drift.position_percent),
         per_metre(drift.heading_per_metre),
