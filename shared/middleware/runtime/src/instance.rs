@@ -1,7 +1,7 @@
 //! An instance: one name, one root path and prefix, one user, one supervisor.
 
 use std::fs;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::{Config, FileName, SemanticString};
@@ -227,13 +227,26 @@ impl Instance {
     pub fn wipe(&self) -> Result<(), InstanceError> {
         remove_folder(&self.root())?;
         remove_file(&self.configuration())?;
+        self.segments().try_for_each(|path| remove_file(&path))
+    }
+
+    /// Takes every right to the instance's segments from other users.
+    pub(crate) fn close_to_others(&self) -> Result<(), InstanceError> {
+        self.segments().try_for_each(|path| {
+            fs::set_permissions(&path, fs::Permissions::from_mode(0o600))
+                .map_err(|source| InstanceError::File { path, source })
+        })
+    }
+
+    /// What the instance has in shared memory.
+    fn segments(&self) -> impl Iterator<Item = PathBuf> {
         let prefix = self.prefix();
-        for entry in fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
-            if entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes()) {
-                remove_file(&entry.path())?;
-            }
-        }
-        Ok(())
+        let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+        entries
+            .filter(move |entry| {
+                entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes())
+            })
+            .map(|entry| entry.path())
     }
 
     /// Removes everything of the instance, its folder included, unless a simulated vehicle still lives there.

@@ -58,6 +58,8 @@ impl Services {
         instance.wipe()?;
         instance.write_configuration()?;
         let session = Session::start(instance, Process::Supervisor)?;
+        // The middleware opens the counter of its nodes to everybody.
+        instance.close_to_others()?;
         let factories = create_all(session.node())?;
         Ok(Self { session, _factories: factories })
     }

@@ -82,11 +82,7 @@ const FAR: f64 = 1e8;
 fn finite(field: &'static str, values: &[f64]) -> Result<(), Refusal> {
     // Without an exit in each round the compiler compares many numbers at once: a plan has some ten thousand.
     let all = |some: &[f64]| some.iter().fold(true, |all, value| all & value.is_finite());
-    if values.chunks(64).all(all) {
-        Ok(())
-    } else {
-        Err(Refusal::NotFinite { field })
-    }
+    if values.chunks(64).all(all) { Ok(()) } else { Err(Refusal::NotFinite { field }) }
 }
 
 /// Every number finite and at most `bound` in size.
