@@ -1,5 +1,8 @@
 //! The recorder: what it leaves when it is killed, and what a full disk costs.
 
+// The helpers of a test unwrap as its functions do.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod common;
 mod common_cli;
 

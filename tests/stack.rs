@@ -376,7 +376,7 @@ fn an_ordinary_user_parks_and_another_one_cannot_reach_it() {
     let scenario = file(&sandbox, "short.toml", SHORT);
     let mut park = sandbox.kerbside();
     park.uid(USER).gid(USER);
-    park.args(["park", scenario.to_str().unwrap(), "--json", "--instance", "one"]);
+    park.args(["park", scenario.to_str().unwrap(), "--json", "--rearm", "--instance", "one"]);
     let park = Running::spawn(&sandbox, "park", park);
     let as_user = |user: u32, mut command: Command| {
         finish({
@@ -406,9 +406,8 @@ fn an_ordinary_user_parks_and_another_one_cannot_reach_it() {
     look.arg("-c").arg("for f; do cat \"$f\" || ls \"$f\"; done >/dev/null 2>&1 && echo reached");
     look.arg("sh").args(&segments).arg(instance.folder()).arg(instance.configuration());
     assert_eq!(as_user(PEER, look).stdout, "", "another user reads what is not theirs");
-    for verb in [verb(&["status", "--instance", "one"]), verb(&["stop"])] {
-        as_user(PEER, verb).refuses(75, &["not running"]);
-    }
+    as_user(PEER, verb(&["status", "--instance", "one"])).refuses(75, &["one is not running"]);
+    as_user(PEER, verb(&["stop"])).refuses(75, &["no instance is running"]);
     as_user(PEER, verb(&["up", "--simulate", "--instance", "one"])).refuses(75, &["kerbside"]);
 
     let said = park.end();

@@ -233,8 +233,11 @@ impl Instance {
     /// Takes every right to the instance's segments from other users.
     pub(crate) fn close_to_others(&self) -> Result<(), InstanceError> {
         self.segments().try_for_each(|path| {
-            fs::set_permissions(&path, fs::Permissions::from_mode(0o600))
-                .map_err(|source| InstanceError::File { path, source })
+            match fs::set_permissions(&path, fs::Permissions::from_mode(0o600)) {
+                // Somebody who held something of an earlier life let go of it.
+                Err(source) if source.kind() == std::io::ErrorKind::NotFound => Ok(()),
+                other => other.map_err(|source| InstanceError::File { path, source }),
+            }
         })
     }
 
