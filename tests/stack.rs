@@ -46,7 +46,7 @@ const GARAGE: &str = "--start=-1.0,0.65,0";
 fn go_until_there(sandbox: &Sandbox, arguments: &[&str]) -> Said {
     for _ in 0..4 {
         let said = verb(sandbox, arguments);
-        let late = ["too old", "deadline", "heartbeat missing"];
+        let late = ["too old", "deadline", "heartbeat missing", "line lost"];
         if said.code == Some(0) || !late.iter().any(|cause| said.stdout.contains(cause)) {
             return said;
         }

@@ -10,7 +10,12 @@ use kerbside_odometry::{Ingest, NoModel};
 use crate::exit::{Exit, Failure};
 use crate::life::{Life, Service};
 
-/// Longest wait; its timing decides nothing.
+/// Longest wait of ingest, estimator and tracker for the event of their input; its timing decides nothing.
+///
+/// They block on the event. `kerbside bench transport`, 280 bytes on 2 cores of a virtual machine, p50: event 36 us on
+/// the other core and 20 us on the same, polling the descriptor 38 and 21, spinning for 200 us first 35 and 19. At 200 Hz
+/// a spin ends 4.8 ms before the next sample comes, so it would burn a core and win nothing; a poll gains nothing, and
+/// can lose a wake-up where the event cannot. Which core counts more than how: with real-time rights the path shares one.
 pub const WAIT: Duration = Duration::from_millis(20);
 
 /// Runs ingest.

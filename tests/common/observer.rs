@@ -6,6 +6,7 @@
 use core::time::Duration;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use kerbside_messages::{
@@ -19,6 +20,8 @@ use super::Sandbox;
 
 /// Names the instance to the observing process.
 const INSTANCE: &str = "KERBSIDE_TEST_OBSERVES";
+/// Longest wait for the observing process to leave.
+const ORDERLY: Duration = Duration::from_secs(1);
 /// The name of the test below.
 const TEST: &str = "common::observer::observes";
 
@@ -188,8 +191,12 @@ impl Observer {
 
 impl Drop for Observer {
     fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        // It leaves in order, as every process does that is asked to.
+        self.stdin = None;
+        if super::stack::poll(ORDERLY, || self.child.try_wait().ok()?).is_none() {
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
     }
 }
 
@@ -204,7 +211,7 @@ fn observes() {
     let Ok(name) = std::env::var(INSTANCE) else { return };
     let instance = Instance::named(&name).unwrap();
     let inhibits = read_inhibits();
-    let mut eyes = open(&instance);
+    let Some(mut eyes) = open(&instance, &inhibits) else { return };
     let mut look = Ticker::new(Duration::from_millis(5));
     let mut told = None;
     let mut out = std::io::stdout().lock();
@@ -214,8 +221,10 @@ fn observes() {
         if lines.drain(..).try_for_each(|line| tell(&mut out, &line)).is_err() {
             return;
         }
-        if let Ok(span) = inhibits.try_recv() {
-            eyes.inhibit(span);
+        match inhibits.try_recv() {
+            Ok(span) => eyes.inhibit(span),
+            Err(TryRecvError::Empty) => {}
+            Err(TryRecvError::Disconnected) => return,
         }
         look.wait();
     }
@@ -226,8 +235,8 @@ fn tell(out: &mut impl Write, line: &Line) -> std::io::Result<()> {
     out.flush()
 }
 
-fn read_inhibits() -> std::sync::mpsc::Receiver<Nanos> {
-    let (sender, receiver) = std::sync::mpsc::channel();
+fn read_inhibits() -> Receiver<Nanos> {
+    let (sender, receiver) = channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lines().map_while(Result::ok) {
             let _ = sender.send(line.parse().unwrap());
@@ -237,14 +246,15 @@ fn read_inhibits() -> std::sync::mpsc::Receiver<Nanos> {
 }
 
 /// Waits for the instance as long as anybody waits for this process.
-fn open(instance: &Instance) -> Eyes {
+fn open(instance: &Instance, inhibits: &Receiver<Nanos>) -> Option<Eyes> {
     let mut retry = Ticker::new(Duration::from_millis(10));
-    loop {
+    while inhibits.try_recv() != Err(TryRecvError::Disconnected) {
         if let Ok(eyes) = Eyes::open(instance) {
-            return eyes;
+            return Some(eyes);
         }
         retry.wait();
     }
+    None
 }
 
 struct Eyes {

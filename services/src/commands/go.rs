@@ -188,8 +188,11 @@ pub fn run(args: &GoArgs) -> Result<Exit, Failure> {
 
 fn wait_for_pose(desk: &mut Desk, odometry: &mut Newest<Odometry>) -> Result<Pose, Failure> {
     let mut look = Ticker::new(LOOK);
-    let deadline = now() + nanos(1.0);
-    while !odometry.update() && now() < deadline {
+    let deadline = now() + nanos(2.0);
+    // A vehicle that is just coming to rest stands before the planner is asked: it refuses a moving one.
+    while !(odometry.update() && odometry.get().is_some_and(|newest| newest.standstill == 1))
+        && now() < deadline
+    {
         desk.state()?;
         look.wait();
     }

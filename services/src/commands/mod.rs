@@ -8,8 +8,6 @@ mod recording;
 mod status;
 mod up;
 
-use std::path::PathBuf;
-
 use clap::{Parser, Subcommand};
 use kerbside_messages::Process;
 use kerbside_runtime::Instance;
@@ -225,12 +223,4 @@ pub fn asks_for_json(matches: &clap::ArgMatches) -> bool {
 
 fn log_levels() -> clap::builder::PossibleValuesParser {
     kerbside_settings::LogLevel::NAMES.iter().copied().into()
-}
-
-/// Where results go, for verbs that write files.
-#[derive(Clone, Debug, clap::Args)]
-pub struct OutArgs {
-    /// Folder for the results; a new one in the state folder where not given.
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
 }

@@ -119,9 +119,14 @@ fn print_table(instance: &Instance, state: &State) {
         "" => println!("mode {}", state.mode()),
         cause => println!("mode {}: {cause}", state.mode()),
     }
+    println!("{}", table(state, crate::output::terminal_width()));
+}
+
+/// A row per process, within `width` columns where that is known.
+fn table(state: &State, width: Option<u16>) -> Table {
     let mut table = Table::new();
     table.load_style(UTF8_FULL_CONDENSED);
-    if let Some(width) = crate::output::terminal_width() {
+    if let Some(width) = width {
         table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
     }
     table.set_header(["process", "pid", "state", "restarts", "misses", "age ms", "says"]);
@@ -136,7 +141,7 @@ fn print_table(instance: &Instance, state: &State) {
             says(row),
         ]);
     }
-    println!("{table}");
+    table
 }
 
 /// What a process says of itself, or what is to be said of it.
@@ -155,4 +160,33 @@ fn name_of(row: &ProcessRow) -> &'static str {
 
 fn state_of(row: &ProcessRow) -> &'static str {
     ProcessState::from_code(row.state).map_or("unknown", ProcessState::name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_fits_a_terminal_and_breaks_what_a_process_says_between_words() {
+        let mut state = State { rows: 2, ..State::default() };
+        for (row, words) in state
+            .processes
+            .iter_mut()
+            .zip(["the configured device, which does not answer for some time now", ""])
+        {
+            *row = ProcessRow {
+                pid: 4_194_304,
+                state: ProcessState::Starting.code(),
+                restarts: 12,
+                misses: 100_000,
+                waiting_for: text::from_str(words),
+                ..ProcessRow::default()
+            };
+        }
+        let narrow = table(&state, Some(80)).to_string();
+        assert!(narrow.lines().all(|line| line.chars().count() <= 80), "{narrow}");
+        assert!(narrow.contains("4194304") && narrow.contains("configured"), "{narrow}");
+        let wide = table(&state, None).to_string();
+        assert!(wide.contains("waits for the configured device, which does not answer"), "{wide}");
+    }
 }

@@ -3,7 +3,8 @@
 use core::time::Duration;
 use std::io::Write;
 use std::os::unix::process::CommandExt;
-use std::process::{Command, Stdio};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
 
 use kerbside_geometry::Pose;
 use kerbside_messages::Process;
@@ -56,9 +57,7 @@ pub fn run(args: &UpArgs, level: Option<&str>) -> Result<Exit, Failure> {
     }
     service.args.simulated |= args.simulate;
     service.args.log = level.map(str::to_owned);
-    if args.simulate {
-        start_vehicle(args, &service)?;
-    }
+    let child = if args.simulate { start_vehicle(args, &service)? } else { None };
     let name = service.instance.name().to_owned();
     let exit = supervisor::run(&service, || {
         if args.with_parent.is_none() {
@@ -67,13 +66,13 @@ pub fn run(args: &UpArgs, level: Option<&str>) -> Result<Exit, Failure> {
         }
     });
     if args.simulate {
-        end_vehicle(&service)?;
+        end_vehicle(&service, child)?;
     }
     exit
 }
 
-/// A vehicle that outlived an earlier supervisor is used as it is.
-fn start_vehicle(args: &UpArgs, service: &Service) -> Result<(), Failure> {
+/// A vehicle that outlived an earlier supervisor is used as it is; else the one that was started.
+fn start_vehicle(args: &UpArgs, service: &Service) -> Result<Option<Child>, Failure> {
     if let Some(pid) = service.instance.supervisor() {
         let name = service.instance.name();
         return Err(Failure::unavailable(format!(
@@ -82,7 +81,7 @@ fn start_vehicle(args: &UpArgs, service: &Service) -> Result<(), Failure> {
     }
     if let Some(pid) = vehicle_of(service) {
         tracing::info!(pid, "the instance has a simulated vehicle");
-        return Ok(());
+        return Ok(None);
     }
     kerbside_runtime::close_inherited_on_exec();
     Command::new("/proc/self/exe")
@@ -95,8 +94,8 @@ fn start_vehicle(args: &UpArgs, service: &Service) -> Result<(), Failure> {
         .stdout(Stdio::null())
         .process_group(0)
         .spawn()
-        .map_err(Failure::internal)?;
-    Ok(())
+        .map(Some)
+        .map_err(Failure::internal)
 }
 
 fn vehicle_of(service: &Service) -> Option<u32> {
@@ -104,23 +103,31 @@ fn vehicle_of(service: &Service) -> Option<u32> {
 }
 
 /// Ends the vehicle, whoever started it; one that was stopped is woken for it, or killed.
-fn end_vehicle(service: &Service) -> Result<(), Failure> {
+fn end_vehicle(service: &Service, mut child: Option<Child>) -> Result<(), Failure> {
     if service.instance.supervisor().is_some() {
         // Another one was faster: vehicle and instance are its own.
         return Ok(());
     }
     let deadline = now() + crate::life::nanos(VEHICLE_END);
     let mut look = Ticker::new(LOOK);
-    if let Some(pid) = vehicle_of(service) {
+    if let Some(pid) = vehicle_of(service).or(child.as_ref().map(Child::id)) {
         kerbside_runtime::terminate(pid);
         kerbside_runtime::resume(pid);
-    }
-    while let Some(pid) = vehicle_of(service) {
-        if now() > deadline {
-            kerbside_runtime::kill(pid);
+        // It gives its lock back before it is gone.
+        while vehicle_of(service).is_some() || !is_gone(pid, &mut child) {
+            if now() > deadline {
+                kerbside_runtime::kill(pid);
+            }
+            look.wait();
         }
-        look.wait();
     }
     service.instance.remove()?;
     Ok(())
+}
+
+fn is_gone(pid: u32, child: &mut Option<Child>) -> bool {
+    match child {
+        Some(child) if child.id() == pid => !matches!(child.try_wait(), Ok(None)),
+        _ => !Path::new(&format!("/proc/{pid}")).exists(),
+    }
 }

@@ -2,6 +2,8 @@
 //!
 //! Topics in: `actuator`. Topics out: `raw`. Without commands the interface sends nothing of its own: silence is
 //! what stops the vehicle. The line is opened by name, and again after an error or 100 ms of silence.
+//!
+//! It waits for two things at once, so it polls; `kerbside bench transport` finds a poll as quick as the event alone.
 
 use std::os::fd::AsFd;
 use std::path::PathBuf;
