@@ -273,11 +273,9 @@ fn measure(args: &PipelineArgs, scheduling: &Scheduling) -> Result<Measured, Fai
     let chain_commands = BareSubscriber::<Command>::open(&session)?;
     let mut tick = Ticker::new(WINDOW);
     let mut measured = Measured::default();
-    for slice in 0..args.seconds {
-        if !drive.goes_on(&mut watch, &mut tick)? {
-            break;
-        }
-        let beside = slice % 2 == 1;
+    let mut kept = 0;
+    while kept < args.seconds && drive.goes_on(&mut watch, &mut tick)? {
+        let beside = kept % 2 == 1;
         chain.feed(beside);
         tick.wait();
         watch.take_in();
@@ -286,6 +284,7 @@ fn measure(args: &PipelineArgs, scheduling: &Scheduling) -> Result<Measured, Fai
         // What was measured while a fault stopped the car says nothing of a car that drives.
         if watch.drives() && !slice.latencies.is_empty() && slice.of_chain.is_empty() != beside {
             measured.keep(beside, slice);
+            kept += 1;
         }
     }
     drop((chain, chain_commands, bare, watch, session));

@@ -264,9 +264,9 @@ fn periods_that_the_supervisor_cannot_resolve_are_refused() {
     // Switched off, the tighter defaults with real-time rights do not count.
     let folder = Folder::new();
     folder.change("stack.toml", "[interface]", "[timeouts]\nheartbeat = 0.04\n\n[interface]");
-    only(folder.sources().stack(), &["timeouts.heartbeat_window = 0.05", "at least 0.08 s"]);
-    folder.change("stack.toml", "enabled = \"auto\"", "enabled = \"off\"");
     assert!(folder.sources().stack().is_ok());
+    folder.change("stack.toml", "enabled = \"off\"", "enabled = \"auto\"");
+    only(folder.sources().stack(), &["timeouts.heartbeat_window = 0.05", "at least 0.08 s"]);
 }
 
 #[test]
