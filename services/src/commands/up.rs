@@ -1,9 +1,9 @@
 //! `up`: the supervisor in the foreground.
 
 use core::time::Duration;
+use std::fs;
 use std::io::Write;
 use std::os::unix::process::CommandExt;
-use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use kerbside_geometry::Pose;
@@ -114,9 +114,14 @@ fn end_vehicle(service: &Service, mut child: Option<Child>) -> Result<(), Failur
         kerbside_runtime::terminate(pid);
         kerbside_runtime::resume(pid);
         // It gives its lock back before it is gone.
+        let mut killed = false;
         while vehicle_of(service).is_some() || !is_gone(pid, &mut child) {
-            if now() > deadline {
+            if now() > deadline && !killed {
                 kerbside_runtime::kill(pid);
+                killed = true;
+            }
+            if now() > deadline + crate::life::nanos(VEHICLE_END) {
+                return Err(Failure::internal(format!("the vehicle, process {pid}, does not end")));
             }
             look.wait();
         }
@@ -128,6 +133,9 @@ fn end_vehicle(service: &Service, mut child: Option<Child>) -> Result<(), Failur
 fn is_gone(pid: u32, child: &mut Option<Child>) -> bool {
     match child {
         Some(child) if child.id() == pid => !matches!(child.try_wait(), Ok(None)),
-        _ => !Path::new(&format!("/proc/{pid}")).exists(),
+        // Somebody else's child stays a zombie until that one looks at it.
+        _ => fs::read_to_string(format!("/proc/{pid}/stat")).map_or(true, |stat| {
+            stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with(['Z', 'X']))
+        }),
     }
 }
