@@ -313,6 +313,15 @@ fn a_service_does_not_join_what_a_killed_supervisor_left() {
 }
 
 #[test]
+fn a_service_whose_supervisor_died_before_they_met_waits_for_no_other() {
+    let sandbox = Sandbox::new();
+    // Process 1 started nobody here.
+    let orphan = ["service", "planner", "--instance", "one", "--supervisor", "1"];
+    run(&sandbox, &orphan).refuses(75, &["the supervisor ended before this process met it"]);
+    sandbox.assert_empty();
+}
+
+#[test]
 fn two_stacks_drive_side_by_side() {
     let one = Sandbox::new();
     let two = one.beside();

@@ -127,11 +127,18 @@ fn has_ended(child: &mut Child) -> bool {
     matches!(child.try_wait(), Ok(Some(_)) | Err(_))
 }
 
-/// Processes whose supervisor was killed end by themselves after two seconds; nobody waits for that here.
+/// Processes whose supervisor was killed end by themselves after two seconds; nobody waits for that here. They are gone
+/// when this returns: what of the instance is removed next, none of them makes anew.
 fn end_orphans(instance: &Instance) {
+    let deadline = now() + nanos(END);
+    let mut look = Ticker::new(RETRY);
     for process in Process::SUPERVISED {
-        if let Some(pid) = FileLock::holder(&instance.process_lock(process)) {
+        let path = instance.process_lock(process);
+        while let Some(pid) = FileLock::holder(&path)
+            && now() < deadline
+        {
             kerbside_runtime::kill(pid);
+            look.wait();
         }
     }
 }

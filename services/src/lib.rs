@@ -27,6 +27,7 @@ pub mod recorder;
 pub mod replay;
 pub mod service;
 pub mod supervisor;
+pub mod tables;
 pub mod tracker;
 pub mod vehicle;
 

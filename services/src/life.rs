@@ -16,6 +16,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 pub use crate::service::Service;
 
 use crate::exit::{Exit, Failure};
+use crate::parent;
 
 /// Time between looks for what is not there yet.
 const RETRY: Duration = Duration::from_millis(20);
@@ -34,6 +35,7 @@ pub struct Life {
     in_step: bool,
     replays: bool,
     external: bool,
+    supervisor: Option<u32>,
     failed: Option<Nanos>,
     _lock: FileLock,
 }
@@ -48,7 +50,7 @@ impl Life {
         service.instance.create_folder()?;
         let lock = take_lock(service)?;
         let process = service.process;
-        let mut waiting = Waiting::new(&stop);
+        let mut waiting = Waiting::new(&stop, service.args.supervisor);
         let session = waiting.until(|| Session::join(&service.instance, process))?;
         let heartbeat = waiting.until(|| session.publisher::<Heartbeat>(Some(process)))?;
         let state = waiting.until(|| session.subscriber::<State>(None, 1))?;
@@ -69,6 +71,7 @@ impl Life {
             in_step: false,
             replays: service.replays(),
             external: service.is_external(process),
+            supervisor: service.args.supervisor,
             failed: None,
             _lock: lock,
         })
@@ -82,7 +85,7 @@ impl Life {
         &self,
         open: impl Fn(&Session) -> Result<T, SessionError>,
     ) -> Result<T, Failure> {
-        Waiting::new(&self.stop).until(|| open(&self.session))
+        Waiting::new(&self.stop, self.supervisor).until(|| open(&self.session))
     }
 
     /// A subscriber that keeps up to `buffer` samples.
@@ -254,12 +257,14 @@ fn take_lock(service: &Service) -> Result<FileLock, Failure> {
 /// Waits for what is not there yet, and says once what it waits for.
 struct Waiting<'a> {
     stop: &'a AtomicBool,
+    supervisor: Option<u32>,
     said: String,
 }
 
 impl<'a> Waiting<'a> {
-    fn new(stop: &'a AtomicBool) -> Self {
-        Self { stop, said: String::new() }
+    /// Until `stop` is set, or the supervisor that started this process is dead.
+    fn new(stop: &'a AtomicBool, supervisor: Option<u32>) -> Self {
+        Self { stop, supervisor, said: String::new() }
     }
 
     fn until<T>(
@@ -274,6 +279,11 @@ impl<'a> Waiting<'a> {
             }
             if self.stop.load(Ordering::Relaxed) {
                 return Err(Failure::unavailable(format!("ended while waiting: {}", self.said)));
+            }
+            if self.supervisor.is_some_and(|pid| !parent::is_alive(pid)) {
+                return Err(Failure::unavailable(
+                    "the supervisor ended before this process met it",
+                ));
             }
             retry.wait();
         }
@@ -397,7 +407,7 @@ fn open_for_worker<P>(
     worker: &Worker,
     open: impl Fn(&Session, &Service) -> Result<P, SessionError>,
 ) -> Result<(Session, P), Failure> {
-    let mut waiting = Waiting::new(&worker.stop);
+    let mut waiting = Waiting::new(&worker.stop, service.args.supervisor);
     let session = waiting.until(|| Session::join(&service.instance, service.process))?;
     let ports = waiting.until(|| open(&session, service))?;
     Ok((session, ports))

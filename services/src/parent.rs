@@ -7,8 +7,13 @@ pub fn die_with_parent(parent: u32) {
     if let Err(error) = set_parent_process_death_signal(Some(Signal::TERM)) {
         tracing::warn!(%error, "will not end with the parent process");
     }
-    let is_parent = |pid: rustix::process::Pid| pid.as_raw_pid().cast_unsigned() == parent;
-    if !getppid().is_some_and(is_parent) {
+    if !is_alive(parent) {
         kerbside_runtime::terminate(std::process::id());
     }
+}
+
+/// Whether `parent`, which started this process, still lives: orphans are handed on to another process.
+#[must_use]
+pub fn is_alive(parent: u32) -> bool {
+    getppid().is_some_and(|pid| pid.as_raw_pid().cast_unsigned() == parent)
 }

@@ -44,6 +44,9 @@ pub struct ServiceArgs {
     /// An earlier life of this process ended: its pose comes from there, not from the configuration.
     #[arg(long, hide = true)]
     pub restarted: bool,
+    /// The supervisor that started this process: where it dies before they met, nobody else is waited for.
+    #[arg(long, value_name = "PID", hide = true)]
+    pub supervisor: Option<u32>,
     /// The instance runs with real-time rights, and so with the shorter time-outs.
     #[arg(long, hide = true)]
     pub realtime: bool,

@@ -19,6 +19,7 @@ pub(crate) mod judging;
 pub(crate) mod observer;
 pub(crate) mod sandbox;
 pub(crate) mod stack;
+pub(crate) mod witness;
 
 pub(crate) use disturbance::undisturbed;
 pub(crate) use observer::{OdometryLine, RowLine, Seen, StateLine, TruthLine};

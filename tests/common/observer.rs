@@ -126,7 +126,10 @@ impl Seen {
             Line::Truth(line) => self.truth.push(line),
             Line::Odometry(line) => self.odometry.push(line),
             Line::Gate(line) => self.gate.push(line),
-            Line::State(line) => self.states.push(line),
+            Line::State(line) => {
+                line.rows.iter().for_each(|row| super::witness::follow(row.pid));
+                self.states.push(line);
+            }
         }
     }
 }

@@ -1,12 +1,12 @@
 //! What a bench says: rows of ours against a rival, as a table or as JSON.
 
-use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{CellAlignment, Table};
+use comfy_table::Table;
 use serde_json::{Value, json};
 
 use super::statistics::{Blocks, Estimate};
 use crate::exit::Exit;
 use crate::figures::Figure;
+use crate::tables;
 
 /// Ours beside a rival.
 #[derive(Clone, Debug)]
@@ -116,38 +116,22 @@ fn print(told: &Told) {
 }
 
 fn table(rows: &[Row]) -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
-    table.set_header([
-        "",
-        "bytes",
-        "p50 us",
-        "p99 us",
-        "against",
-        "p50 us",
-        "p99 us",
-        "ratio p50",
-        "95 %",
-        "ratio p99",
-    ]);
+    let header = ["", "us: p50, p99", "against", "us: p50, p99", "ratio of p50 (95 %)", "of p99"];
+    let mut table = tables::figures(&header, &[1, 3, 4, 5]);
     for row in rows {
+        let Estimate { value, low, high } = row.ratio;
+        let name = match row.bytes {
+            0 => row.name.clone(),
+            bytes => format!("{}, {bytes} B", row.name),
+        };
         table.add_row([
-            row.name.clone(),
-            row.bytes.to_string(),
-            format!("{:.2}", row.ours.0),
-            format!("{:.2}", row.ours.1),
+            name,
+            format!("{:.1} {:.1}", row.ours.0, row.ours.1),
             row.rival.clone(),
-            format!("{:.2}", row.rivals.0),
-            format!("{:.2}", row.rivals.1),
-            format!("{:.3}", row.ratio.value),
-            format!("{:.3} to {:.3}", row.ratio.low, row.ratio.high),
-            format!("{:.3}", row.ratio_p99()),
+            format!("{:.1} {:.1}", row.rivals.0, row.rivals.1),
+            format!("{value:.2} ({low:.2}-{high:.2})"),
+            format!("{:.2}", row.ratio_p99()),
         ]);
-    }
-    for index in [1, 2, 3, 5, 6, 7, 9] {
-        if let Some(column) = table.column_mut(index) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
     }
     table
 }

@@ -2,8 +2,7 @@
 
 use core::time::Duration;
 
-use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{ContentArrangement, Table};
+use comfy_table::Table;
 use kerbside_messages::{Mode, Process, ProcessRow, ProcessState, State, text};
 use kerbside_runtime::{Instance, Newest, Session, Ticker, now};
 use serde_json::json;
@@ -124,11 +123,7 @@ fn print_table(instance: &Instance, state: &State) {
 
 /// A row per process, within `width` columns where that is known.
 fn table(state: &State, width: Option<u16>) -> Table {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
-    if let Some(width) = width {
-        table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
-    }
+    let mut table = crate::tables::framed_within(width);
     table.set_header(["process", "pid", "state", "restarts", "misses", "age ms", "says"]);
     for row in state.rows() {
         table.add_row([

@@ -1,7 +1,6 @@
 //! What `park` says at the end: a table for people, or one JSON object.
 
-use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{Cell, Table};
+use comfy_table::Cell;
 use kerbside_geometry::{Pose, angle};
 use kerbside_reports::JudgedOn;
 use serde_json::{Value, json};
@@ -9,6 +8,7 @@ use serde_json::{Value, json};
 use super::{Finished, ParkArgs};
 use crate::exit::Exit;
 use crate::figures::Figure;
+use crate::tables;
 
 /// Mean end error that several runs are held against: each axis \[m\].
 const MEAN_POSITION: f64 = 0.010;
@@ -122,8 +122,7 @@ fn speed_factor(one: &Finished) -> Option<f64> {
 fn print_one(one: &Finished) {
     let (verdict, run, trace) = (&one.verdict, &one.run, &one.run.trace);
     println!("{}", sentence(one));
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
+    let mut table = tables::framed();
     let mut row = |name: &str, value: String| {
         table.add_row([Cell::new(name), Cell::new(value)]);
     };
@@ -193,9 +192,8 @@ fn latency_in_words(one: &Finished) -> String {
 }
 
 fn print_many(finished: &[Finished], figures: &[Figure]) {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
-    table.set_header(["seed", "verdict", "x, y mm, yaw °", "gears", "time s", "clearance cm"]);
+    let header = ["seed", "verdict", "x, y mm, yaw °", "gears", "time s", "clearance cm"];
+    let mut table = tables::figures(&header, &[0, 3, 4, 5]);
     for one in finished {
         let verdict = &one.verdict;
         let words = if verdict.parked {

@@ -98,6 +98,11 @@ impl Comparison {
         let model = OdometryModel::from_code(newest.model).unwrap_or(OdometryModel::None);
         notes.extend(sensing::lacks(model, &input.sensors));
         notes.extend(caution(track));
+        match track.gaps.len() {
+            0 => {}
+            1 => notes.push("1 gap in the readings, bridged by one arc".to_owned()),
+            gaps => notes.push(format!("{gaps} gaps in the readings, each bridged by one arc")),
+        }
         if newest.unusable > 0 {
             let travels = if newest.unusable == 1 { "travel" } else { "travels" };
             notes.push(format!("{} {travels} without usable wheels", newest.unusable));

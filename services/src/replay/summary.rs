@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{Cell, Table};
+use comfy_table::Cell;
 use kerbside_geometry::angle;
 use kerbside_messages::EstimatorState;
 use serde_json::{Map, Value, json};
@@ -11,6 +10,7 @@ use serde_json::{Map, Value, json};
 use super::report::model_of;
 use super::{Finished, Outcome, ReplayArgs, sensing};
 use crate::exit::{Exit, Failure};
+use crate::tables;
 
 /// Tells what came of one drive.
 pub fn tell_one(args: &ReplayArgs, one: &Finished) -> Exit {
@@ -119,8 +119,7 @@ fn print_one(one: &Finished) {
         None => println!("{name}: replayed {}", one.mode_in_words()),
         Some(problem) => println!("{name}: not replayed: {problem}"),
     }
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
+    let mut table = tables::framed();
     let mut row = |name: &str, value: String| {
         table.add_row([Cell::new(name), Cell::new(value)]);
     };
@@ -192,13 +191,17 @@ fn significant(value: f64) -> String {
 }
 
 fn print_many(folder: &Path, outcomes: &[Outcome]) {
-    let mut table = Table::new();
-    table.load_style(UTF8_FULL_CONDENSED);
-    table.set_header(["run", "model", "m", "gaps", "drift %", "rad/m", "end error", "x real time"]);
-    for outcome in outcomes {
-        table.add_row(row_of(outcome));
+    let header = ["run", "model", "m", "drift %", "rad/m", "end: x, y m, yaw °", "x real time"];
+    let mut table = tables::figures(&header, &[2, 3, 4, 5, 6]);
+    for one in finished(outcomes) {
+        table.add_row(row_of(one));
     }
     println!("{table}");
+    for outcome in outcomes {
+        if let Err(failure) = &outcome.result {
+            println!("{}: refused: {}", name_of(outcome), words(failure));
+        }
+    }
     for one in finished(outcomes) {
         let name = one.job.input.drive.name();
         one.problem.iter().for_each(|problem| println!("{name}: not replayed: {problem}"));
@@ -235,22 +238,23 @@ fn words(failure: &Failure) -> String {
     core::iter::once(failure.report.to_string()).chain(problems).collect::<Vec<_>>().join("; ")
 }
 
-fn row_of(outcome: &Outcome) -> Vec<String> {
-    let name = outcome.input.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let one = match &outcome.result {
-        Ok(one) => one,
-        Err(failure) => return vec![name, format!("refused: {}", words(failure))],
-    };
+fn name_of(outcome: &Outcome) -> String {
+    outcome.input.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn row_of(one: &Finished) -> Vec<String> {
     let drift = one.comparison.drift.as_ref().ok();
     let known = |value: Option<String>| value.unwrap_or_else(|| "-".to_owned());
     vec![
-        name,
+        one.job.input.drive.name().to_owned(),
         model_of(one).name().to_owned(),
         format!("{:.1}", one.track.distance()),
-        one.track.gaps.len().to_string(),
         known(drift.map(|drift| format!("{:.2}", drift.position_percent))),
         known(drift.map(|drift| significant(drift.heading_rad_per_m))),
-        end_in_words(one),
+        known(drift.map(|drift| {
+            let end = drift.end_error;
+            format!("{:+.3} {:+.3} {:+.2}", end.x, end.y, angle::degrees(end.yaw))
+        })),
         format!("{:.0}", one.speed_factor()),
     ]
 }

@@ -42,6 +42,7 @@ impl Children {
             .arg(process.name())
             .args(&self.arguments)
             .args(restarted.then_some("--restarted"))
+            .args(["--supervisor", &std::process::id().to_string()])
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             // A group of its own: Ctrl-C on the terminal reaches the supervisor alone, which ends the others in order.

@@ -1,5 +1,6 @@
 //! An instance: one name, one root path and prefix, one user, one supervisor.
 
+use core::time::Duration;
 use std::fs;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
@@ -7,6 +8,7 @@ use std::path::{Path, PathBuf};
 use iceoryx2::prelude::{Config, FileName, SemanticString};
 use kerbside_messages::Process;
 
+use crate::Ticker;
 use crate::lock::{FileLock, LockError};
 
 /// Longest name of an instance.
@@ -16,6 +18,11 @@ pub const MAX_NAME: usize = 24;
 const SOCKET_PATH: usize = 107;
 /// Bytes that the middleware's socket names need behind the root: a slash, prefix, number and suffix.
 const SOCKET_NAME: usize = 1 + 15 + 39 + 6;
+
+/// Attempts to remove a folder in which somebody may be at work.
+const REMOVALS: u32 = 50;
+/// Time between them.
+const PAUSE: Duration = Duration::from_millis(2);
 
 /// How the line of the prefix begins in the middleware's configuration.
 const PREFIX_KEY: &str = "prefix = \"";
@@ -225,14 +232,28 @@ impl Instance {
     /// # Errors
     /// [`InstanceError::File`].
     pub fn wipe(&self) -> Result<(), InstanceError> {
-        remove_folder(&self.root())?;
+        // First what tells others how to join: who read it before undoes what it makes from it.
         remove_file(&self.configuration())?;
-        self.segments().try_for_each(|path| remove_file(&path))
+        remove_folder(&self.root())?;
+        self.segments(&self.prefix()).try_for_each(|path| remove_file(&path))
+    }
+
+    /// Removes what came into being for a life that had ended already; its folders too, unless somebody else lives
+    /// there by now.
+    pub(crate) fn remove_life(&self, ended: &Config) -> Result<(), InstanceError> {
+        let prefix = ended.global.prefix.to_string();
+        self.segments(&prefix).try_for_each(|path| remove_file(&path))?;
+        if self.supervisor().is_none() {
+            remove_folder(&self.root())?;
+            // Refused where anything is in it.
+            let _ = fs::remove_dir(&self.folder);
+        }
+        Ok(())
     }
 
     /// Takes every right to the instance's segments from other users.
     pub(crate) fn close_to_others(&self) -> Result<(), InstanceError> {
-        self.segments().try_for_each(|path| {
+        self.segments(&self.prefix()).try_for_each(|path| {
             match fs::set_permissions(&path, fs::Permissions::from_mode(0o600)) {
                 // Somebody who held something of an earlier life let go of it.
                 Err(source) if source.kind() == std::io::ErrorKind::NotFound => Ok(()),
@@ -241,9 +262,8 @@ impl Instance {
         })
     }
 
-    /// What the instance has in shared memory.
-    fn segments(&self) -> impl Iterator<Item = PathBuf> {
-        let prefix = self.prefix();
+    /// What the instance has in shared memory under `prefix`: its own, or that of one of its lives.
+    fn segments(&self, prefix: &str) -> impl Iterator<Item = PathBuf> {
         let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
         entries
             .filter(move |entry| {
@@ -338,11 +358,21 @@ fn run_time_folder() -> PathBuf {
 }
 
 fn remove_folder(path: &Path) -> Result<(), InstanceError> {
-    match fs::remove_dir_all(path) {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-            Err(InstanceError::File { path: path.to_owned(), source })
+    let mut attempts = REMOVALS;
+    let mut pause = Ticker::new(PAUSE);
+    loop {
+        attempts -= 1;
+        match fs::remove_dir_all(path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+            // Somebody put a file there while the others were removed.
+            Err(error) if error.kind() == std::io::ErrorKind::DirectoryNotEmpty && attempts > 0 => {
+                pause.wait();
+            }
+            other => {
+                return other
+                    .map_err(|source| InstanceError::File { path: path.to_owned(), source });
+            }
         }
-        _ => Ok(()),
     }
 }
 

@@ -70,13 +70,13 @@ impl FileLock {
         Ok(Self { file, path: path.to_owned() })
     }
 
-    /// Holds the lock at `path` without becoming its owner: nobody takes it meanwhile. None where it has an owner, or
-    /// there is none.
+    /// Holds the lock at `path` without becoming its owner: nobody takes it meanwhile. None where it has an owner, or its
+    /// folder is gone.
     #[must_use]
     pub fn block(path: &Path) -> Option<File> {
         let mut pause = Ticker::new(PAUSE);
         for _ in 0..ATTEMPTS {
-            let mut file = OpenOptions::new().read(true).open(path).ok()?;
+            let mut file = open(path).ok()?;
             if flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok() {
                 return is_at(&file, path).then_some(file);
             }
@@ -151,7 +151,8 @@ mod tests {
     fn a_blocked_lock_is_nobodys_and_a_removed_one_counts_no_more() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.lock");
-        assert!(FileLock::block(&path).is_none(), "there is none yet");
+        assert!(FileLock::block(&folder.path().join("gone/x.lock")).is_none());
+        assert!(FileLock::block(&path).is_some(), "nobody has owned it yet");
         drop(FileLock::take(&path).unwrap());
         let blocked = FileLock::block(&path).unwrap();
         assert_eq!(FileLock::holder(&path), None);

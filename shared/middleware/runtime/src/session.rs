@@ -111,6 +111,13 @@ impl Session {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .context("create node", "all")?;
+        if instance.middleware_config()?.is_none_or(|now| now.global.prefix != config.global.prefix)
+        {
+            // The instance ended meanwhile, and the node has brought to life again what its end had removed.
+            drop(node);
+            instance.remove_life(&config).map_err(SessionError::Instance)?;
+            return Err(SessionError::no_supervisor(instance));
+        }
         Ok(Self { node, instance: instance.clone() })
     }
 

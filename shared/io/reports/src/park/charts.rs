@@ -6,7 +6,8 @@ use super::data::{CommandSample, EventKind, Latency, ParkReport};
 use super::errors::{EstimateError, estimate_errors};
 use super::scene::{ESTIMATE, PLAN, TRUTH};
 use crate::svg::{
-    Band, Chart, Figure, Ink, Line, Mark, Range, Span, Tone, Trace, latency_histogram, latency_tail,
+    Band, Chart, Figure, Ink, Line, Mark, Range, Span, Ticks, Tone, Trace, latency_histogram,
+    latency_tail,
 };
 use crate::track::over_time;
 use crate::{Motion, format};
@@ -14,6 +15,8 @@ use crate::{Motion, format};
 const COMMAND: Line = Line::new(Ink::Purple);
 /// 95 of 100 are below it: chi-square with three degrees of freedom.
 const CHI_SQUARE: f64 = 7.815;
+/// Lower end of the chart of the normalised error: an error this small says no more than a smaller one.
+const LEAST_NEES: f64 = 0.01;
 /// Neighbouring samples further apart than this are not joined by a line \[s\].
 const HOLE: f64 = 0.5;
 
@@ -126,14 +129,20 @@ impl ParkReport {
     }
 
     fn consistency_chart(&self, errors: &[EstimateError]) -> Chart {
-        let points = errors.iter().map(|error| [error.time, error.normalised]).collect();
+        let shown = errors.iter().map(|error| error.normalised).filter(|value| value.is_finite());
+        let range = Range::new(LEAST_NEES, shown.fold(10.0 * CHI_SQUARE, f64::max) * 2.0);
+        let point = |error: &EstimateError| [error.time, error.normalised.max(LEAST_NEES)];
+        let points = errors.iter().map(point).collect();
         let title = "Normalised error squared (NEES)";
         Chart {
             description:
-                "Error squared in units of its covariance, over time, with its 95 % limit."
+                "Error squared in units of its covariance, over time, with its 95 % limit; \
+                          logarithmic."
                     .to_owned(),
             traces: vec![trace("error in units of its covariance", Line::new(Ink::Text), points)],
             limits: vec![CHI_SQUARE],
+            y_ticks: Ticks::Log,
+            y_range: Some(range),
             y_title: "[-], dashed: 95 % limit".to_owned(),
             ..self.time_chart("consistency", title, "-", 2.0)
         }

@@ -14,6 +14,8 @@ pub enum Ticks {
     LogCount,
     /// At powers of ten; labelled as shares in per cent.
     LogShare,
+    /// At powers of ten; labelled with the number.
+    Log,
 }
 
 /// A place on an axis.
@@ -131,6 +133,7 @@ fn log_label(value: f64, kind: Ticks) -> String {
     match kind {
         Ticks::LogDuration => plain_duration(value),
         Ticks::LogShare => format::with_unit(&plain(value * 100.0), "%"),
+        Ticks::Log => plain(value),
         Ticks::LogCount | Ticks::Linear => format::count(value.round() as u64),
     }
 }
@@ -182,6 +185,8 @@ mod tests {
             labels(&share.ticks(8)),
             ["0.01\u{202f}%", "0.1\u{202f}%", "1\u{202f}%", "10\u{202f}%", "100\u{202f}%"]
         );
+        let number = Scale::new(Ticks::Log, Range::new(0.01, 100.0), 0.0, 1.0);
+        assert_eq!(labels(&number.ticks(8)), ["0.01", "0.1", "1", "10", "100"]);
     }
 
     #[test]

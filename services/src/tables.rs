@@ -1,0 +1,43 @@
+//! Tables for people: one look, and no line longer than the terminal.
+
+use comfy_table::presets::{UTF8_FULL_CONDENSED, UTF8_HORIZONTAL_ONLY};
+use comfy_table::{CellAlignment, ContentArrangement, Table};
+
+use crate::output::terminal_width;
+
+/// Columns that a table of figures keeps to where no terminal says how many there are.
+const WIDTH: u16 = 80;
+
+/// A table with a frame, for names and what they are; cells break between words where the terminal is narrow.
+#[must_use]
+pub fn framed() -> Table {
+    framed_within(terminal_width())
+}
+
+/// The same within `width` columns, where that is known.
+#[must_use]
+pub fn framed_within(width: Option<u16>) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    if let Some(width) = width {
+        table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width);
+    }
+    table
+}
+
+/// A table of many columns of figures under `header`; columns of numbers, by index, are aligned to the right.
+#[must_use]
+pub fn figures(header: &[&str], numbers: &[usize]) -> Table {
+    let mut table = Table::new();
+    table.load_style(UTF8_HORIZONTAL_ONLY);
+    table
+        .set_content_arrangement(ContentArrangement::Dynamic)
+        .set_width(terminal_width().unwrap_or(WIDTH).max(WIDTH))
+        .set_header(header.to_vec());
+    for index in numbers {
+        if let Some(column) = table.column_mut(*index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table
+}
