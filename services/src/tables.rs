@@ -1,12 +1,16 @@
 //! Tables for people: one look, and no line longer than the terminal.
 
 use comfy_table::presets::{UTF8_FULL_CONDENSED, UTF8_HORIZONTAL_ONLY};
-use comfy_table::{CellAlignment, ContentArrangement, Table};
+use comfy_table::{
+    CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, Table, TableStyle,
+};
 
 use crate::output::terminal_width;
 
 /// Columns that a table of figures keeps to where no terminal says how many there are.
 const WIDTH: u16 = 80;
+/// A line above, below the header and below, none between rows.
+const LINED: TableStyle = UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none());
 
 /// A table with a frame, for names and what they are; cells break between words where the terminal is narrow.
 #[must_use]
@@ -29,7 +33,7 @@ pub fn framed_within(width: Option<u16>) -> Table {
 #[must_use]
 pub fn figures(header: &[&str], numbers: &[usize]) -> Table {
     let mut table = Table::new();
-    table.load_style(UTF8_HORIZONTAL_ONLY);
+    table.load_style(LINED);
     table
         .set_content_arrangement(ContentArrangement::Dynamic)
         .set_width(terminal_width().unwrap_or(WIDTH).max(WIDTH))
@@ -37,6 +41,8 @@ pub fn figures(header: &[&str], numbers: &[usize]) -> Table {
     for index in numbers {
         if let Some(column) = table.column_mut(*index) {
             column.set_cell_alignment(CellAlignment::Right);
+            // Words may break, numbers may not.
+            column.set_constraint(ColumnConstraint::ContentWidth);
         }
     }
     table

@@ -41,8 +41,8 @@ impl Carrier {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Stack => "stack",
-            Self::Bare => "bare iceoryx2",
-            Self::Datagram => "Unix datagram",
+            Self::Bare => "iceoryx2",
+            Self::Datagram => "datagram",
         }
     }
 }

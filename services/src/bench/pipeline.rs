@@ -394,7 +394,7 @@ impl Measured {
     }
 
     fn tell(&self, name: &str, told: &mut Told) {
-        let rival = "chain of bare hops";
+        let rival = "bare chain";
         let latency = format!("reading to command, {name}");
         told.rows.push(Row::of(&latency, 0, &self.beside, rival, &self.chain));
         let work = Row {

@@ -84,6 +84,7 @@ pub struct Told {
 
 /// Tells, and judges.
 pub fn tell(told: &Told, as_json: bool) -> Exit {
+    kerbside_runtime::end_on_broken_pipe();
     let passed = told.figures.iter().all(Figure::passed);
     if as_json {
         println!("{}", object(told, passed));
@@ -116,8 +117,8 @@ fn print(told: &Told) {
 }
 
 fn table(rows: &[Row]) -> Table {
-    let header = ["", "us: p50, p99", "against", "us: p50, p99", "ratio of p50 (95 %)", "of p99"];
-    let mut table = tables::figures(&header, &[1, 3, 4, 5]);
+    let header = ["", "p50 us", "p99 us", "against", "p50 us", "ratio (95 %)", "at p99"];
+    let mut table = tables::figures(&header, &[1, 2, 4, 5, 6]);
     for row in rows {
         let Estimate { value, low, high } = row.ratio;
         let name = match row.bytes {
@@ -126,9 +127,10 @@ fn table(rows: &[Row]) -> Table {
         };
         table.add_row([
             name,
-            format!("{:.1} {:.1}", row.ours.0, row.ours.1),
+            format!("{:.1}", row.ours.0),
+            format!("{:.1}", row.ours.1),
             row.rival.clone(),
-            format!("{:.1} {:.1}", row.rivals.0, row.rivals.1),
+            format!("{:.1}", row.rivals.0),
             format!("{value:.2} ({low:.2}-{high:.2})"),
             format!("{:.2}", row.ratio_p99()),
         ]);

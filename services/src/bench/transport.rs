@@ -106,10 +106,14 @@ impl Cores {
     }
 
     fn notes(&self) -> Vec<String> {
-        let mut notes = vec![match self.priority {
+        let mut notes = vec![
+            "iceoryx2: a bare publish and event of the same size; datagram: a Unix datagram socket"
+                .to_owned(),
+        ];
+        notes.push(match self.priority {
             Some(_) => "both ends under SCHED_FIFO".to_owned(),
             None => "both ends under the ordinary scheduler".to_owned(),
-        }];
+        });
         if self.other == self.sender {
             notes.push("one core: sender and receiver share it".to_owned());
         }

@@ -17,6 +17,7 @@ const MEAN_YAW: f64 = 0.6 * core::f64::consts::PI / 180.0;
 
 /// Tells what came of the runs, and how well.
 pub fn tell(args: &ParkArgs, finished: &[Finished]) -> Exit {
+    kerbside_runtime::end_on_broken_pipe();
     let figures = figures(finished);
     let complete = finished.len() == args.runs as usize;
     let passed = complete

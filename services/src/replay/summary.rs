@@ -14,6 +14,7 @@ use crate::tables;
 
 /// Tells what came of one drive.
 pub fn tell_one(args: &ReplayArgs, one: &Finished) -> Exit {
+    kerbside_runtime::end_on_broken_pipe();
     let passed = one.problem.is_none();
     if args.json {
         println!("{}", with_common(one_as_json(one), passed));
@@ -25,6 +26,7 @@ pub fn tell_one(args: &ReplayArgs, one: &Finished) -> Exit {
 
 /// Tells what came of `wanted` drives.
 pub fn tell_many(args: &ReplayArgs, folder: &Path, outcomes: &[Outcome], wanted: usize) -> Exit {
+    kerbside_runtime::end_on_broken_pipe();
     let exit = outcomes.iter().map(exit_of).find(|exit| *exit != Exit::Good);
     let exit = exit.unwrap_or(if outcomes.len() == wanted { Exit::Good } else { Exit::Bad });
     if args.json {
@@ -191,8 +193,8 @@ fn significant(value: f64) -> String {
 }
 
 fn print_many(folder: &Path, outcomes: &[Outcome]) {
-    let header = ["run", "model", "m", "drift %", "rad/m", "end: x, y m, yaw °", "x real time"];
-    let mut table = tables::figures(&header, &[2, 3, 4, 5, 6]);
+    let header = ["run", "m", "drift %", "rad/m", "end m", "end °", "x real"];
+    let mut table = tables::figures(&header, &[1, 2, 3, 4, 5, 6]);
     for one in finished(outcomes) {
         table.add_row(row_of(one));
     }
@@ -217,15 +219,16 @@ fn finished(outcomes: &[Outcome]) -> impl Iterator<Item = &Finished> {
     outcomes.iter().filter_map(|outcome| outcome.result.as_deref().ok())
 }
 
-/// Each note once, with the runs it is of.
-fn grouped_notes(outcomes: &[Outcome]) -> Vec<(&str, Vec<&str>)> {
-    let mut grouped: Vec<(&str, Vec<&str>)> = Vec::new();
+/// The model of the odometry and each note once, with the runs it is of.
+fn grouped_notes(outcomes: &[Outcome]) -> Vec<(String, Vec<&str>)> {
+    let mut grouped: Vec<(String, Vec<&str>)> = Vec::new();
     for one in finished(outcomes) {
         let name = one.job.input.drive.name();
-        for note in &one.notes {
-            match grouped.iter_mut().find(|(known, _)| *known == note.as_str()) {
+        let model = format!("odometry from {}", model_of(one));
+        for note in core::iter::once(&model).chain(&one.notes) {
+            match grouped.iter_mut().find(|(known, _)| known == note) {
                 Some((_, names)) => names.push(name),
-                None => grouped.push((note, vec![name])),
+                None => grouped.push((note.clone(), vec![name])),
             }
         }
     }
@@ -247,14 +250,11 @@ fn row_of(one: &Finished) -> Vec<String> {
     let known = |value: Option<String>| value.unwrap_or_else(|| "-".to_owned());
     vec![
         one.job.input.drive.name().to_owned(),
-        model_of(one).name().to_owned(),
         format!("{:.1}", one.track.distance()),
         known(drift.map(|drift| format!("{:.2}", drift.position_percent))),
         known(drift.map(|drift| significant(drift.heading_rad_per_m))),
-        known(drift.map(|drift| {
-            let end = drift.end_error;
-            format!("{:+.3} {:+.3} {:+.2}", end.x, end.y, angle::degrees(end.yaw))
-        })),
+        known(drift.map(|drift| format!("{:.3}", drift.end_error.x.hypot(drift.end_error.y)))),
+        known(drift.map(|drift| format!("{:+.2}", angle::degrees(drift.end_error.yaw)))),
         format!("{:.0}", one.speed_factor()),
     ]
 }

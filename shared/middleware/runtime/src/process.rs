@@ -12,7 +12,7 @@ pub fn close_inherited_on_exec() {
 }
 
 /// Ends this process in silence when nobody reads its output any more, as people expect of a command in a pipe. Only
-/// for verbs that do nothing but print.
+/// for a process that has nothing left to do but print.
 pub fn end_on_broken_pipe() {
     // SAFETY: the default action takes the place of an ignored signal; no handler of ours runs.
     unsafe {
