@@ -11,11 +11,17 @@ fn main() {
             let manoeuvre = Manoeuvre::s_path(Pace::paper(speed));
             let drive = TestDrive::new(Chassis::paper(), physics, Sensors::paper(1.0), manoeuvre);
             let (begin, trials) = (Instant::now(), 50_u32);
-            let rows: usize =
-                (0..u64::from(trials)).map(|seed| drive.record(seed).counts.len()).sum();
+            let count = |recorded: kerbside_proving_ground::Recorded| recorded.counts.len();
+            let rows: usize = (0..u64::from(trials)).map(|seed| count(drive.record(seed))).sum();
             let each = begin.elapsed().as_secs_f64() * 1e3 / f64::from(trials);
+            let (driven, begin) = (drive.driven(), Instant::now());
+            let again: usize = (0..u64::from(trials)).map(|seed| count(driven.record(seed))).sum();
+            let seed = begin.elapsed().as_secs_f64() * 1e3 / f64::from(trials);
+            assert_eq!(rows, again, "the same drive has the same rows");
             let end = drive.record(1).truth.last().map(|state| state.pose);
-            println!("{name}, {speed} m/s: {each:.3} ms a drive, {rows} rows in all, end {end:?}");
+            println!(
+                "{name}, {speed} m/s: {each:.3} ms a drive, {seed:.3} ms a further seed, {rows} rows in all, end {end:?}"
+            );
         }
     }
 }

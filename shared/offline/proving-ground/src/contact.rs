@@ -21,7 +21,7 @@ const RIGID: f64 = 1e-6;
 const PIVOT: f64 = 0.05;
 /// Rounds of the iteration, and the change of the unknowns that ends it.
 const ROUNDS: usize = 40;
-const SETTLED: f64 = 1e-11;
+const SETTLED: f64 = 1e-10;
 /// So much of the friction at most is asked of the tyres by the car's acceleration along and across.
 const HELD: f64 = 0.95;
 /// A tyre that slides keeps so much of its stiffness, lest nothing tells how fast.
@@ -205,15 +205,16 @@ impl Contacts {
             self.inertia(drivetrain, unit, direction * z[FORWARD], direction * z[YAW])
         };
         let motor = self.motor_rate(direction, unit);
+        let headings = self.headings(drivetrain.steering);
         let begin = [direction * unit.forward, 0.0, direction * unit.yaw, 0.0, 0.0, 0.0, 0.0];
         let mut z = self.last.filter(|last| last.0 == direction).map_or(begin, |last| last.1);
-        let mut wheels = self.wheels_at(drivetrain.steering, motor, &z);
+        let mut wheels = self.wheels_at(&headings, motor, &z);
         for _ in 0..ROUNDS {
             let next = self.equations(direction, force(&z), motor, &z, &wheels).solve();
             let change = (0..UNKNOWNS).map(|i| (next[i] - z[i]).abs()).fold(0.0, f64::max);
             let damping = (BOLDEST / change).min(1.0);
             z = core::array::from_fn(|i| z[i] + damping * (next[i] - z[i]));
-            wheels = self.wheels_at(drivetrain.steering, motor, &z);
+            wheels = self.wheels_at(&headings, motor, &z);
             if change < SETTLED {
                 break;
             }
@@ -232,22 +233,42 @@ impl Contacts {
         direction * sum / count
     }
 
-    fn wheels_at(&self, steering: f64, motor: f64, z: &[f64; UNKNOWNS]) -> [Wheel; 4] {
-        let (tyres, linkage) = (&self.physics.tyres, &self.physics.linkage);
+    /// Angle of each wheel while the linkage is not bent, with its sine and cosine \[rad\].
+    fn headings(&self, steering: f64) -> [(f64, f64, f64); 4] {
+        let (linkage, wheelbase) = (&self.physics.linkage, self.chassis.wheelbase);
         core::array::from_fn(|i| {
             let contact = &self.wheels[i];
-            let steered = contact.x != 0.0;
-            let wheelbase = self.chassis.wheelbase;
-            let rack = |y| wheel_angle(steering, wheelbase, y, linkage.ackermann) + z[BEND];
-            let angle = linkage.toe[i] + if steered { rack(contact.y) } else { 0.0 };
+            let rack = if contact.is_steered() {
+                wheel_angle(steering, wheelbase, contact.y, linkage.ackermann)
+            } else {
+                0.0
+            };
+            let angle = linkage.toe[i] + rack;
             let (sin, cos) = math::sin_cos(angle);
+            (angle, sin, cos)
+        })
+    }
+
+    fn wheels_at(
+        &self,
+        headings: &[(f64, f64, f64); 4],
+        motor: f64,
+        z: &[f64; UNKNOWNS],
+    ) -> [Wheel; 4] {
+        let tyres = &self.physics.tyres;
+        core::array::from_fn(|i| {
+            let contact = &self.wheels[i];
+            let (angle, sin, cos) = headings[i];
+            let bent = contact.is_steered() && z[BEND] != 0.0;
+            let (sin, cos) = if bent { math::sin_cos(angle + z[BEND]) } else { (sin, cos) };
             let (vx, vy) = (z[FORWARD] - z[YAW] * contact.y, z[LATERAL] + z[YAW] * contact.x);
             let (along, across) = (cos * vx + sin * vy, cos * vy - sin * vx);
             let spin = if contact.driven { contact.surface(motor, z) - along } else { 0.0 };
             let rolled = along.abs().max(PIVOT);
             let (side, drive) = (contact.lateral_compliance, contact.longitudinal_compliance);
             let share = if tyres.friction.is_finite() {
-                math::hypot(across / side, spin / drive) / (rolled * tyres.friction)
+                let (lateral, longitudinal) = (across / side, spin / drive);
+                (lateral * lateral + longitudinal * longitudinal).sqrt() / (rolled * tyres.friction)
             } else {
                 0.0
             };
@@ -361,6 +382,11 @@ impl Contacts {
 }
 
 impl Contact {
+    /// Whether the wheel is on the front axle.
+    fn is_steered(&self) -> bool {
+        self.x != 0.0
+    }
+
     /// Speed of the surface of a driven wheel.
     fn surface(&self, motor: f64, z: &[f64; UNKNOWNS]) -> f64 {
         let split: f64 = (FRONT_SPLIT..UNKNOWNS).map(|i| self.split[i] * z[i]).sum();
@@ -370,7 +396,7 @@ impl Contact {
     /// Row and target of the side slip, linear about the present bend of a linkage that bends.
     fn lateral_row(&self, wheel: &Wheel, bend: f64, bends: bool) -> ([f64; UNKNOWNS], f64) {
         let (sin, cos) = (wheel.sin, wheel.cos);
-        let turned = if bends && self.x != 0.0 { -wheel.along } else { 0.0 };
+        let turned = if bends && self.is_steered() { -wheel.along } else { 0.0 };
         let row = [-sin, cos, sin * self.y + cos * self.x, turned, 0.0, 0.0, 0.0];
         (row, turned * bend)
     }

@@ -179,3 +179,58 @@ fn near_their_friction_the_tyres_yield_and_beyond_it_the_motion_stays_bounded() 
         assert!(size < 100.0, "{speed}: {motion:?}");
     }
 }
+
+/// Forces along x and y and moment about the rear-axle centre that the tyres put on the body in `motion`, from their slip
+/// alone \[N, N m\].
+fn tyre_forces(physics: &Physics, steering: f64, bend: f64, motion: &Motion) -> [f64; 3] {
+    let (chassis, tyres) = (Chassis::paper(), physics.tyres);
+    let mut total = [0.0; 3];
+    for wheel in WHEELS {
+        let (i, (x, y), load) = (wheel.index(), chassis.wheel_position(wheel), chassis.load(wheel));
+        let rack = wheel_angle(steering, 0.5, y, physics.linkage.ackermann) + bend;
+        let angle = physics.linkage.toe[i] + if wheel.is_front() { rack } else { 0.0 };
+        let (sin, cos) = math::sin_cos(angle);
+        let (vx, vy) = (motion.forward - y * motion.yaw_rate, motion.lateral + x * motion.yaw_rate);
+        let (along, across) = (cos * vx + sin * vy, cos * vy - sin * vx);
+        let surface = motion.rotation_rate[i] * chassis.radius[i];
+        let side = -across / along.abs() / tyres.lateral_compliance[usize::from(!wheel.is_front())];
+        let drive = (surface - along) / along.abs() / tyres.longitudinal_compliance;
+        let driven = if wheel.is_front() { 0.0 } else { drive };
+        let grip = load * brush(math::hypot(side, driven) / tyres.friction);
+        // A wheel that only rolls passes on its resistance.
+        let pull = if wheel.is_front() { load * drive } else { grip * driven };
+        let (fx, fy) = (cos * pull - sin * grip * side, sin * pull + cos * grip * side);
+        total = [total[0] + fx, total[1] + fy, total[2] + x * fy - y * fx];
+    }
+    total
+}
+
+#[test]
+fn the_tyres_forces_carry_the_body() {
+    let mut physics = Physics::ordinary();
+    physics.actuators.droop = 0.0;
+    physics.tyres.friction = 0.5;
+    let chassis = Chassis::paper();
+    for (speed, steering, lock) in
+        [(0.2, 0.3, 0.0), (0.8, -0.2, 0.02), (-0.3, 0.5, 0.5), (0.1, 0.0, 0.0)]
+    {
+        physics.differential_lock = lock;
+        let mut contacts = contacts(physics);
+        let drivetrain =
+            Drivetrain { acceleration: 0.3, steering_rate: 0.4, ..at(speed, steering) };
+        let motion = contacts.motion(&drivetrain);
+        let bend = contacts.last.map_or(0.0, |last| last.1[BEND]);
+        let forces = tyre_forces(&physics, steering, bend, &motion);
+        // Newton and Euler about the rear-axle centre, changes of the yaw rate as of ideal rolling.
+        let curvature = math::tan(steering) / 0.5;
+        let turning = 0.3 * curvature + speed * 0.4 / 0.5 / math::cos(steering).powi(2);
+        let (arm, mass) = (chassis.centre_of_mass, chassis.mass);
+        let across = motion.forward * motion.yaw_rate + arm * turning;
+        let along = 0.3 - arm * motion.yaw_rate * motion.yaw_rate;
+        let expected =
+            [mass * along, mass * across, chassis.yaw_inertia * turning + arm * mass * across];
+        for (force, expected) in forces.into_iter().zip(expected) {
+            assert!((force - expected).abs() < 2e-3, "{speed}: {force} against {expected}");
+        }
+    }
+}

@@ -100,11 +100,9 @@ impl Instruments {
     }
 
     /// Counts of the wheels: the counter's bits, sign-extended; none of a wheel without an encoder or one that is not
-    /// read. Quantised by floor of the cumulative rotation.
-    pub fn counts(&mut self, state: &State) -> [Option<i64>; 4] {
-        let Some(encoders) = &self.sensors.encoders else {
-            return [None; 4];
-        };
+    /// read, and none at all without encoders. Quantised by floor of the cumulative rotation.
+    pub fn counts(&mut self, state: &State) -> Option<[Option<i64>; 4]> {
+        let encoders = self.sensors.encoders.as_ref()?;
         let mut counts = [None; 4];
         for (wheel, reader) in WHEELS.into_iter().zip(&mut self.wheels) {
             let i = wheel.index();
@@ -119,7 +117,7 @@ impl Instruments {
                 .shown(steps, failure(encoders, i, state.time))
                 .map(|steps| wrapped(encoders, i, steps));
         }
-        counts
+        Some(counts)
     }
 
     /// The steering sensor's angle \[rad\]; none without a sensor.

@@ -18,7 +18,8 @@
 //! - [`Plant`]: the integral of that motion by the Runge-Kutta method of fourth order.
 //! - [`Instruments`]: encoders that count whole numbers and wrap, steering sensor, gyro and reference, with white and
 //!   coloured errors, each from its own stream of the seed; wheels that spin or skid ([`Slip`]).
-//! - [`TestDrive`] makes a [`Recorded`] of all this: what a run's folder would hold, and the truth.
+//! - [`TestDrive`] makes a [`Recorded`] of all this: what a run's folder would hold, and the truth. What was
+//!   [`Driven`] once can be recorded with many seeds.
 //!
 //! **Kinematic limit.** With [`Physics::NEUTRAL`] the car rolls ideally: held commands are exact arcs, paths are covered
 //! exactly (the heading is the exact integral of the curvature), and the integrated vehicle agrees with both. Every
@@ -44,6 +45,7 @@ mod balance;
 mod chassis;
 mod colour;
 mod contact;
+mod drive;
 mod instruments;
 mod leg;
 mod manoeuvre;
@@ -58,6 +60,7 @@ mod sensors;
 
 pub use actuators::Command;
 pub use chassis::{Chassis, GRAVITY};
+pub use drive::TestDrive;
 pub use instruments::Instruments;
 pub use leg::{Leg, Section};
 pub use manoeuvre::{Manoeuvre, PAUSE};
@@ -65,7 +68,7 @@ pub use paper::{REAR_NOISE, Residuals};
 pub use physics::{Actuators, Linkage, Physics, Tyres};
 pub use plant::{LONGEST_STEP, Plant, State};
 pub use profile::Pace;
-pub use record::{Recorded, Stamped, TestDrive};
+pub use record::{Driven, Recorded, Stamped};
 pub use sensors::{
     Coloured, EncoderFault, Encoders, Failure, Gyro, Reference, Sensors, Slip, SteeringSensor,
 };

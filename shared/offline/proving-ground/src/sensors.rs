@@ -129,7 +129,8 @@ pub struct Sensors {
 pub struct Slip {
     /// Which wheels.
     pub wheels: Vec<Wheel>,
-    /// What each surface runs ahead of its rolling, negative for a wheel that lags, as when it skids \[m\].
+    /// What each surface runs on beyond its rolling, forward positive whichever way the car goes; negative for a wheel
+    /// that skids on the way forward \[m\].
     pub travel: f64,
     /// From when \[s\].
     pub begin: f64,
@@ -156,7 +157,7 @@ impl Slip {
         Self { wheels: vec![Wheel::FrontLeft, Wheel::FrontRight], travel: -travel, begin, duration }
     }
 
-    /// What the surface of `wheel` has run ahead at `time` \[m\].
+    /// What the surface of `wheel` has run on beyond its rolling by `time` \[m\].
     #[must_use]
     pub fn travel_at(&self, wheel: Wheel, time: f64) -> f64 {
         if !self.wheels.contains(&wheel) || time < self.begin {

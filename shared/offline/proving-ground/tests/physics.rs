@@ -1,5 +1,8 @@
 //! The vehicle with its physics on.
 
+// Tests may end loudly; so may what they call.
+#![allow(clippy::expect_used, clippy::panic, clippy::unwrap_used)]
+
 use kerbside_geometry::Pose;
 use kerbside_proving_ground::{
     Actuators, Chassis, Command, Manoeuvre, Pace, Physics, Plant, Sensors, State, TestDrive,
