@@ -23,8 +23,8 @@ pub struct Linkage {
     /// 1: each front wheel points along its own circle; 0: both stand parallel.
     pub ackermann: f64,
     /// Angle by which the axle's side force, which acts behind the contact's centre as seen in the direction of travel,
-    /// bends both front wheels alike \[rad/N\]. Between rigid tyres it hardly does in a turn: bent alike they cannot both
-    /// roll.
+    /// bends both front wheels alike \[rad/N\]. Between rigid
+    /// tyres only the side force that balances inertia does so.
     pub compliance: f64,
     /// Angles that each wheel, the rear ones included, has beside that, left positive \[rad\].
     pub toe: [f64; 4],

@@ -9,11 +9,15 @@
 //!
 //! Without compliance the balance is the weighted least-squares compromise between wheels that cannot all roll.
 
-use kerbside_geometry::{Drive, WHEELS, math};
+use kerbside_geometry::{WHEELS, Wheel as Corner, math};
 
 use crate::balance::{Balance, UNKNOWNS};
 use crate::chassis::{Chassis, GRAVITY, UnitMotion};
 use crate::physics::{Physics, brush, wheel_angle};
+
+use wheel::{Contact, Wheel, split};
+
+mod wheel;
 
 /// Stands for a compliance of zero where others are not: it slips by a millionth under its own load.
 const RIGID: f64 = 1e-6;
@@ -65,47 +69,22 @@ pub(crate) struct Motion {
     pub rotation_rate: [f64; 4],
 }
 
-/// A wheel's fixed properties.
-#[derive(Clone, Copy, Debug)]
-struct Contact {
-    x: f64,
-    y: f64,
-    radius: f64,
-    load: f64,
-    driven: bool,
-    lateral_compliance: f64,
-    longitudinal_compliance: f64,
-    /// Signs with which the splits of the differentials enter its rotation rate.
-    split: [f64; UNKNOWNS],
-}
-
 /// Body on four wheels.
 #[derive(Clone, Debug)]
 pub(crate) struct Contacts {
     chassis: Chassis,
     physics: Physics,
     ideal: bool,
-    /// Whether forces move anything; among rigid parts they do not.
+    /// Whether the tyres yield to forces.
     yields: bool,
+    /// Whether the linkage's bend is an unknown. Between rigid tyres it is given: the wheels' quarrel with one another
+    /// knows no bounds there, and inertia alone bends.
+    bends: bool,
     /// The largest compliance, by which the balance is scaled.
     scale: f64,
     wheels: [Contact; 4],
     /// The last solution and its direction of travel: where the next one begins.
     last: Option<(f64, [f64; UNKNOWNS])>,
-}
-
-/// One wheel in one round of the iteration; speeds per unit of commanded speed.
-#[derive(Clone, Copy, Debug, Default)]
-struct Wheel {
-    sin: f64,
-    cos: f64,
-    /// Along the wheel's own heading.
-    along: f64,
-    /// What the wheel's surface runs ahead of that; 0 of one that is not driven.
-    spin: f64,
-    /// Stiffnesses, scaled.
-    lateral_weight: f64,
-    longitudinal_weight: f64,
 }
 
 impl Contacts {
@@ -114,7 +93,7 @@ impl Contacts {
         let tyres = &physics.tyres;
         let lateral = tyres.lateral_compliance.map(|value| value.max(RIGID));
         let longitudinal = tyres.longitudinal_compliance.max(RIGID);
-        let contact = |wheel: kerbside_geometry::Wheel| {
+        let contact = |wheel: Corner| {
             let (x, y) = chassis.wheel_position(wheel);
             Contact {
                 x,
@@ -131,7 +110,8 @@ impl Contacts {
             chassis: *chassis,
             physics: *physics,
             ideal: physics.rolls_ideally(),
-            yields: !tyres.are_rigid() || physics.linkage.compliance > 0.0,
+            yields: !tyres.are_rigid(),
+            bends: !tyres.are_rigid() && physics.linkage.compliance > 0.0,
             scale: lateral[0].max(lateral[1]).max(longitudinal),
             wheels: WHEELS.map(contact),
             last: None,
@@ -205,9 +185,10 @@ impl Contacts {
             self.inertia(drivetrain, unit, direction * z[FORWARD], direction * z[YAW])
         };
         let motor = self.motor_rate(direction, unit);
-        let headings = self.headings(drivetrain.steering);
         let begin = [direction * unit.forward, 0.0, direction * unit.yaw, 0.0, 0.0, 0.0, 0.0];
         let mut z = self.last.filter(|last| last.0 == direction).map_or(begin, |last| last.1);
+        let headings =
+            self.headings(drivetrain.steering, self.given_bend(direction, force(&begin)));
         let mut wheels = self.wheels_at(&headings, motor, &z);
         for _ in 0..ROUNDS {
             let next = self.equations(direction, force(&z), motor, &z, &wheels).solve();
@@ -233,13 +214,22 @@ impl Contacts {
         direction * sum / count
     }
 
-    /// Angle of each wheel while the linkage is not bent, with its sine and cosine \[rad\].
-    fn headings(&self, steering: f64) -> [(f64, f64, f64); 4] {
+    /// Bend of the linkage between rigid tyres: that of the side force that balances inertia's moment \[rad\].
+    fn given_bend(&self, direction: f64, force: [f64; 3]) -> f64 {
+        if self.yields {
+            return 0.0;
+        }
+        let side_force = -force[YAW] / self.chassis.wheelbase;
+        -direction * self.physics.linkage.compliance * side_force
+    }
+
+    /// Angle of each wheel with a given bend of the linkage, and the angle's sine and cosine \[rad\].
+    fn headings(&self, steering: f64, bend: f64) -> [(f64, f64, f64); 4] {
         let (linkage, wheelbase) = (&self.physics.linkage, self.chassis.wheelbase);
         core::array::from_fn(|i| {
             let contact = &self.wheels[i];
             let rack = if contact.is_steered() {
-                wheel_angle(steering, wheelbase, contact.y, linkage.ackermann)
+                wheel_angle(steering, wheelbase, contact.y, linkage.ackermann) + bend
             } else {
                 0.0
             };
@@ -292,10 +282,9 @@ impl Contacts {
         z: &[f64; UNKNOWNS],
         wheels: &[Wheel; 4],
     ) -> Balance {
-        let bends = self.physics.linkage.compliance > 0.0;
         let mut balance = Balance::new();
         for (contact, wheel) in self.wheels.iter().zip(wheels) {
-            let (row, target) = contact.lateral_row(wheel, z[BEND], bends);
+            let (row, target) = contact.lateral_row(wheel, z[BEND], self.bends);
             balance.add(wheel.lateral_weight, &row, target);
             if contact.driven {
                 let (row, target) = contact.longitudinal_row(wheel, motor);
@@ -315,9 +304,8 @@ impl Contacts {
     fn add_couplings(&self, balance: &mut Balance) {
         let single =
             |unknown: usize| core::array::from_fn(|i| if i == unknown { 1.0 } else { 0.0 });
-        let compliance = self.physics.linkage.compliance;
-        if compliance > 0.0 {
-            balance.add(self.scale / compliance, &single(BEND), 0.0);
+        if self.bends {
+            balance.add(self.scale / self.physics.linkage.compliance, &single(BEND), 0.0);
         } else {
             balance.fix(BEND);
         }
@@ -381,54 +369,5 @@ impl Contacts {
     }
 }
 
-impl Contact {
-    /// Whether the wheel is on the front axle.
-    fn is_steered(&self) -> bool {
-        self.x != 0.0
-    }
-
-    /// Speed of the surface of a driven wheel.
-    fn surface(&self, motor: f64, z: &[f64; UNKNOWNS]) -> f64 {
-        let split: f64 = (FRONT_SPLIT..UNKNOWNS).map(|i| self.split[i] * z[i]).sum();
-        self.radius * (motor + split)
-    }
-
-    /// Row and target of the side slip, linear about the present bend of a linkage that bends.
-    fn lateral_row(&self, wheel: &Wheel, bend: f64, bends: bool) -> ([f64; UNKNOWNS], f64) {
-        let (sin, cos) = (wheel.sin, wheel.cos);
-        let turned = if bends && self.is_steered() { -wheel.along } else { 0.0 };
-        let row = [-sin, cos, sin * self.y + cos * self.x, turned, 0.0, 0.0, 0.0];
-        (row, turned * bend)
-    }
-
-    /// Row and target of the longitudinal slip.
-    fn longitudinal_row(&self, wheel: &Wheel, motor: f64) -> ([f64; UNKNOWNS], f64) {
-        let (sin, cos) = (wheel.sin, wheel.cos);
-        let mut row = self.split.map(|sign| sign * self.radius);
-        row[FORWARD] = -cos;
-        row[LATERAL] = -sin;
-        row[YAW] = cos * self.y - sin * self.x;
-        (row, -self.radius * motor)
-    }
-}
-
-/// How the differentials' splits enter a wheel's rotation rate.
-fn split(drive: Drive, wheel: kerbside_geometry::Wheel) -> [f64; UNKNOWNS] {
-    let mut split = [0.0; UNKNOWNS];
-    let side = if wheel.is_left() { -1.0 } else { 1.0 };
-    let all = drive == Drive::All;
-    if wheel.is_front() && (all || drive == Drive::Front) {
-        split[FRONT_SPLIT] = side;
-    }
-    if !wheel.is_front() && (all || drive == Drive::Rear) {
-        split[REAR_SPLIT] = side;
-    }
-    if all {
-        split[CENTRE_SPLIT] = if wheel.is_front() { 1.0 } else { -1.0 };
-    }
-    split
-}
-
 #[cfg(test)]
-#[path = "contact_tests.rs"]
 mod tests;

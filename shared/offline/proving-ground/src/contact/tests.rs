@@ -1,7 +1,8 @@
 //! Tests of the balance of forces.
 
 use super::*;
-use crate::chassis::GRAVITY;
+use kerbside_geometry::Drive;
+
 use crate::physics::{Linkage, Tyres};
 
 fn contacts(physics: Physics) -> Contacts {
@@ -118,8 +119,9 @@ fn too_little_ackermann_lets_the_front_wheels_scrub() {
 fn the_linkage_bends_out_of_the_curve_forward_and_into_it_in_reverse() {
     // Equal grip in front and in the rear does not understeer of itself.
     let linkage = Linkage { compliance: 2e-3, ..Linkage::NEUTRAL };
-    let physics = Physics { linkage, ..with_tyres(0.1, 0.1, 0.05) };
-    for speed in [0.5, -0.5] {
+    let soft = Physics { linkage, ..with_tyres(0.1, 0.1, 0.05) };
+    let rigid = Physics { linkage, ..Physics::NEUTRAL };
+    for (speed, physics) in [(0.5, soft), (-0.5, soft), (0.5, rigid), (-0.5, rigid)] {
         let motion = contacts(physics).motion(&at(speed, 0.2));
         let chassis = Chassis::paper();
         let side = chassis.mass * chassis.centre_of_mass / 0.5 * motion.yaw_rate * motion.forward;
@@ -231,6 +233,19 @@ fn the_tyres_forces_carry_the_body() {
             [mass * along, mass * across, chassis.yaw_inertia * turning + arm * mass * across];
         for (force, expected) in forces.into_iter().zip(expected) {
             assert!((force - expected).abs() < 2e-3, "{speed}: {force} against {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_small_error_of_the_linkage_is_a_small_error_of_the_turn() {
+    for strength in [0.01, 1.0] {
+        let linkage = Physics::ordinary().at_strength(strength).linkage;
+        for tyres in [Tyres::NEUTRAL, with_tyres(0.1, 0.1, 0.05).tyres] {
+            let physics = Physics { linkage, tyres, ..Physics::NEUTRAL };
+            let turn = contacts(physics).motion(&at(0.1, 0.3)).yaw_rate;
+            let ideal = contacts(Physics::NEUTRAL).motion(&at(0.1, 0.3)).yaw_rate;
+            assert!((turn / ideal - 1.0).abs() < 0.01 * strength, "{strength}: {}", turn / ideal);
         }
     }
 }
