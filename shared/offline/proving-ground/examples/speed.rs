@@ -19,9 +19,8 @@ fn main() {
             let seed = begin.elapsed().as_secs_f64() * 1e3 / f64::from(trials);
             assert_eq!(rows, again, "the same drive has the same rows");
             let end = drive.record(1).truth.last().map(|state| state.pose);
-            println!(
-                "{name}, {speed} m/s: {each:.3} ms a drive, {seed:.3} ms a further seed, {rows} rows in all, end {end:?}"
-            );
+            println!("{name}, {speed} m/s: {each:.3} ms a drive, {seed:.3} ms a further seed");
+            println!("  {} rows a drive, end {end:?}", rows / 50);
         }
     }
 }

@@ -26,16 +26,16 @@
 //! term of the physics can be neutral on its own.
 //!
 //! **Sources.** R. Rajamani, *Vehicle Dynamics and Control*, chapters 2 and 13 (balance of the plane body, understeer, tyre
-//! slip); H. B. Pacejka, *Tire and Vehicle Dynamics*, chapters 1, 3 and 5 (steady slip, brush model, pneumatic trail,
+//! slip); H. B. Pacejka, *Tire and Vehicle Dynamics*, chapters 1 and 3 (steady slip, brush model, pneumatic trail,
 //! compliance of the steering); the digest of Lee, Chung and Chang for the geometry and the paper's car.
 //!
 //! **What it leaves out.** The balance is quasi-steady: tyres build up their force without relaxation length (a few
-//! centimetres of rolling) and the body follows without side-slip transients (a few milliseconds at parking speed);
-//! a change of the yaw rate is felt as that of ideal rolling. No roll, pitch, load transfer or camber; no slope or unevenness of
-//! the floor; no turning torque of a single contact; rigid tyres know no friction limit. A turn that asks for more side
-//! force than the friction holds has no quasi-steady balance: its motion is bounded and no more. Slips are put in,
-//! they do not arise from too much torque, and they move counts and not the body. The rolling radius does
-//! not depend on speed or load.
+//! centimetres of rolling) and the body follows without side-slip transients (a few milliseconds at parking speed); a
+//! change of the yaw rate is felt as that of ideal rolling. No roll, pitch, load transfer or camber; no slope or unevenness
+//! of the floor; no turning torque of a single contact; rigid tyres know no friction limit. A turn that asks for more
+//! side force than the friction holds has no quasi-steady balance: its motion is bounded and no more. Slips are put in,
+//! they do not arise from too much torque, and they move counts and not the body. The rolling radius does not depend on
+//! speed or load. Only cars with a steered front axle are driven.
 //!
 //! Frames: x forward, y left, yaw counter-clockwise, the body frame at the centre of the rear axle, on the ground. SI
 //! units, radians. Pure: no clock, no input or output; the same seed gives the same bits on every machine.

@@ -184,7 +184,7 @@ impl Physics {
 /// Secant stiffness of the brush model over its stiffness at rest, at `load_share` = the linear force over the largest
 /// one: F/F_max = 3r - 3r^2 + r^3 with r = `load_share` / 3, and 1 beyond r = 1.
 ///
-/// Source: Pacejka, *Tire and Vehicle Dynamics*, section 3.2, equations (3.6) to (3.9); combined slip as in 3.2.3.
+/// Source: Pacejka, *Tire and Vehicle Dynamics*, section 3.2, for pure and for combined slip.
 pub(crate) fn brush(load_share: f64) -> f64 {
     let r = load_share / 3.0;
     if r < 1.0 { 1.0 - r + r * r / 3.0 } else { 1.0 / (3.0 * r) }

@@ -2,8 +2,8 @@
 
 use kerbside_geometry::{Pose, Wheel};
 
-/// An error that is remembered: a stationary first-order Gauss-Markov process (Gelb, *Applied Optimal Estimation*,
-/// section 3.8).
+/// An error that is remembered: a stationary first-order Gauss-Markov process, the exponentially correlated variable of
+/// Gelb, *Applied Optimal Estimation*.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Coloured {
     /// Standard deviation, in the unit of what it is added to.
