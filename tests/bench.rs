@@ -79,3 +79,20 @@ fn the_pipeline_is_measured_while_the_car_drives() {
     assert!(way["latency_us"]["samples"].as_u64().unwrap() > 100, "{way}");
     assert!(way["work_us"].as_f64().unwrap() > 0.0, "{way}");
 }
+
+#[test]
+fn a_filter_step_is_measured_against_its_twin_where_there_is_a_compiler() {
+    let (object, output) = bench(&["filter", "--blocks", "4", "--steps", "1000"]);
+    assert!(object["step_ns"].as_f64().is_some_and(|nanos| nanos > 0.0), "{object}");
+    match object["twin"].as_str() {
+        Some(why) => {
+            eprintln!("skipped: {why}");
+            assert_eq!((output.status.code(), &object["passed"]), (Some(0), &true.into()));
+        }
+        // What the two compute was compared, else the verb fails.
+        None => {
+            check(&object, &output);
+            assert!(object["twin_ns"].as_f64().is_some_and(|nanos| nanos > 0.0), "{object}");
+        }
+    }
+}

@@ -1,6 +1,7 @@
-//! `bench`: what a hop, the pipeline and a start cost on this machine, held against limits.
+//! `bench`: what a hop, the pipeline, a start and a filter step cost on this machine, held against limits.
 
 mod chain;
+mod filter;
 mod hop;
 mod peer;
 mod pipeline;
@@ -30,6 +31,9 @@ pub enum BenchVerb {
     /// Recorded readings through ingest and estimator in one process, against real time.
     #[command(after_help = "Example: kerbside bench replay --minutes 60")]
     Replay(replay::ReplayBenchArgs),
+    /// A step of the pose filter, against the same arithmetic in C++.
+    #[command(after_help = "Example: kerbside bench filter --blocks 40")]
+    Filter(filter::FilterArgs),
     /// The other process of `transport`.
     #[command(hide = true)]
     Peer(peer::PeerArgs),
@@ -48,6 +52,7 @@ pub fn run(verb: &BenchVerb) -> Result<Exit, Failure> {
         BenchVerb::Pipeline(args) => pipeline::run(args),
         BenchVerb::Start(args) => start::run(args),
         BenchVerb::Replay(args) => replay::run(args),
+        BenchVerb::Filter(args) => filter::run(args),
         BenchVerb::Peer(args) => peer::run(args),
         BenchVerb::Link(args) => chain::run_link(args),
     }

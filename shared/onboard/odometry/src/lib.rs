@@ -24,7 +24,7 @@ mod settings;
 mod wheels;
 
 pub use clock::{ClockMap, Mapped};
-pub use estimator::{Estimator, EstimatorInputs};
+pub use estimator::{Estimate, Estimator, EstimatorInputs, Increment};
 pub use ingest::Ingest;
 pub use sensors::{NoModel, Sensors, WheelSignal, model_for};
 pub use settings::{EstimatorSettings, IngestSettings, InitialPose};

@@ -147,23 +147,17 @@ impl FrontCorrection {
         let (front, rear) = (self.way.pose, estimate.pose);
         let innovation = Vector3::new(front.x - rear.x, front.y - rear.y, front.yaw - rear.yaw);
         let noise = self.way.covariance + Matrix3::identity() * FLOOR;
-        let spread = estimate.covariance + noise;
-        let Some(test_ratio) = mahalanobis(&innovation, &(spread + self.counted(anchor))) else {
-            return;
-        };
-        let Some(inverse) = spread.try_inverse() else { return };
         self.record.innovation = innovation.into();
+        let gate = self.gate;
+        let slack = self.counted(anchor);
+        let Some(test_ratio) = estimate.update(&innovation, &noise, &slack, gate) else { return };
         self.record.test_ratio = test_ratio;
-        if test_ratio > self.gate {
+        if test_ratio > gate {
             self.record.gated = self.record.gated.wrapping_add(1);
-            return;
+        } else {
+            self.record.corrections = self.record.corrections.wrapping_add(1);
+            self.record.corrected = true;
         }
-        let gain = estimate.covariance * inverse;
-        let change = gain * innovation;
-        estimate.pose = Pose::new(rear.x + change.x, rear.y + change.y, rear.yaw + change.z);
-        estimate.covariance = joseph(&gain, &estimate.covariance, &noise);
-        self.record.corrections = self.record.corrections.wrapping_add(1);
-        self.record.corrected = true;
     }
 
     /// Covariance that the counts of both axles leave in the block since `anchor`.
@@ -173,18 +167,6 @@ impl FrontCorrection {
         let (_, _, by_piece) = advance(anchor, &block);
         symmetric(&(by_piece * self.quantisation * by_piece.transpose()))
     }
-}
-
-/// Squared length of `innovation` in units of `spread`; none where that is singular.
-fn mahalanobis(innovation: &Vector3<f64>, spread: &Matrix3<f64>) -> Option<f64> {
-    let inverse = spread.try_inverse()?;
-    Some((innovation.transpose() * inverse * innovation).x.max(0.0))
-}
-
-/// (I - K) P (I - K)' + K R K'.
-fn joseph(gain: &Matrix3<f64>, covariance: &Matrix3<f64>, noise: &Matrix3<f64>) -> Matrix3<f64> {
-    let rest = Matrix3::identity() - gain;
-    symmetric(&(rest * covariance * rest.transpose() + gain * noise * gain.transpose()))
 }
 
 /// A block's travel is the difference of two counts, each uniformly off within a count q: variance

@@ -8,6 +8,7 @@ mod kinematics;
 mod model;
 mod odometer;
 mod twist;
+mod update;
 
 use kerbside_geometry::{Pose, Vehicle};
 use kerbside_messages::{
@@ -22,7 +23,7 @@ use crate::wheels::{self, elapsed};
 use fixes::{Rest, Ruling};
 use front::FrontCorrection;
 use gyro::GyroIntegral;
-use increment::{Estimate, Increment};
+pub use increment::{Estimate, Increment};
 use model::{Aids, Model};
 use odometer::{Brought, Odometer};
 use twist::Twist;
