@@ -19,7 +19,8 @@ type Gradient = SVector<f64, UNKNOWNS>;
 /// Square matrix of parameters.
 pub type Square = SMatrix<f64, COUNT, COUNT>;
 
-/// How many residuals there are, and their sum of squares, in standard deviations.
+/// How many residuals there are, and their sum of squares, in standard deviations, those that are weighed down as
+/// Huber's cost counts them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Squares {
     pub(crate) sum: f64,
@@ -277,7 +278,7 @@ impl<'a> Chain<'a> {
         let (weight, cost) = huber(deviations, self.limit);
         self.normal.add(&gradient, residual, weight / total);
         self.normal.cost += cost;
-        self.normal.truth.add(deviations * deviations, 1);
+        self.normal.truth.add(cost, 1);
         self.note(0, deviations.abs(), residual);
         // Weighed down, the reading is as if it had a larger variance.
         let gain = spread * (weight / total);
@@ -310,7 +311,7 @@ impl<'a> Chain<'a> {
         #[allow(clippy::cast_precision_loss)]
         let count = found.freedom as f64;
         self.normal.cost += cost * count;
-        self.normal.comparison.add(square, found.freedom);
+        self.normal.comparison.add(cost * count, found.freedom);
         self.note(1, deviations, deviations);
     }
 }

@@ -73,6 +73,8 @@ pub(crate) struct Condensed {
     pub(crate) begin: f64,
 }
 
+/// Share of the wheels' travel below which the vehicle turns on the spot.
+const SPIN: f64 = 0.2;
 /// Poses of the start that are known by agreement are as good as exact \[m\], \[rad\].
 const AGREED: f64 = 1e-6;
 
@@ -309,11 +311,16 @@ impl Base {
         let mean =
             |t: f64| wheels.iter().map(|(wheel, radius)| wheel.at(t) * radius).sum::<f64>() * share;
         let net: Vec<f64> = t.iter().map(|t| mean(*t)).collect();
-        let mut rolled = Vec::with_capacity(net.len());
-        let mut sum = 0.0;
-        for index in 0..net.len() {
-            sum += if index > 0 { (net[index] - net[index - 1]).abs() } else { 0.0 };
-            rolled.push(sum);
+        let mut rolled = vec![0.0; net.len()];
+        // Wheel by wheel: a vehicle that turns on the spot rolls, too.
+        for (wheel, radius) in &wheels {
+            let (mut before, mut sum) = (wheel.at(from), 0.0);
+            for (rolled, t) in rolled.iter_mut().zip(&t) {
+                let now = wheel.at(*t);
+                sum += (now - before).abs() * radius * share;
+                *rolled += sum;
+                before = now;
+            }
         }
         Some(Self { t, rolled, net })
     }
@@ -359,6 +366,9 @@ impl Base {
         let (mut begun, mut direction) = (0.0, 0.0);
         for index in 1..self.t.len() {
             let step = self.net[index] - self.net[index - 1];
+            // On the spot there is no direction of travel to change.
+            let spins = step.abs() < SPIN * (self.rolled[index] - self.rolled[index - 1]);
+            let step = if spins { 0.0 } else { step };
             if step * direction < 0.0 && self.rolled[index - 1] > begun {
                 times.push(self.t[index - 1]);
                 begun = self.rolled[index - 1];

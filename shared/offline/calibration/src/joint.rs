@@ -70,28 +70,47 @@ pub(crate) fn joint_fit(
     // Least squares find the valley; only there do large residuals tell outliers from a bad start.
     let whole = fit(runs, *first, starts, &prior, settings, f64::INFINITY)?;
     let mut kept: Vec<&Condensed> = runs.to_vec();
-    let mut state = robust(&kept, whole.parameters, whole.starts, &prior, settings)?;
+    let mut state = robust(&kept, whole, &prior, settings)?;
     let mut rejected = Vec::new();
     while let Some((index, why)) = outlier(&state, &kept, runs.len(), settings) {
         rejected.push(Rejected { run: kept[index].name.clone(), why });
         kept.remove(index);
         state.starts.remove(index);
-        state = robust(&kept, state.parameters, state.starts, &prior, settings)?;
+        state.normals.remove(index);
+        state = robust(&kept, state, &prior, settings)?;
     }
     finish(&kept, state, &prior, settings, rejected)
 }
 
+/// Rounds in which the scale of the residuals settles.
+const ROUNDS: usize = 3;
+
 /// A robust fit whose prior holds only what the runs leave open.
+///
+/// What is weighed down is judged by the residuals that there are: where the noise is larger than believed
+/// everywhere, a residual of three believed deviations is an ordinary one.
 fn robust(
     runs: &[&Condensed],
-    parameters: Parameters,
-    starts: Vec<Pose>,
+    from: Fit,
     prior: &Prior,
     settings: &Settings,
 ) -> Result<Fit, CalibrationError> {
-    let first = fit(runs, parameters, starts, prior, settings, settings.huber)?;
-    let open = only_where_open(prior, &first.information(), settings);
-    fit(runs, first.parameters, first.starts, &open, settings, settings.huber)
+    let (mut state, mut scale) = (from, f64::INFINITY);
+    for _ in 0..ROUNDS {
+        let next = typical(&state).sqrt();
+        if next > 0.9 * scale {
+            break;
+        }
+        scale = next;
+        state = fit(runs, state.parameters, state.starts, prior, settings, settings.huber * scale)?;
+    }
+    let open = only_where_open(prior, &state.information(), settings);
+    fit(runs, state.parameters, state.starts, &open, settings, settings.huber * scale)
+}
+
+/// Mean square of the residuals of the median run; 1 where they are as believed or smaller.
+fn typical(fit: &Fit) -> f64 {
+    median(fit.normals.iter().map(run_mean_square).collect()).max(1.0)
 }
 
 fn mean_square(squares: Squares, taken: f64) -> f64 {
@@ -125,7 +144,7 @@ fn outlier(
         return None;
     }
     // Where the noise is larger than believed in every run, none of them is an outlier for it.
-    let typical = median(fit.normals.iter().map(run_mean_square).collect()).max(1.0);
+    let typical = typical(fit);
     let deviations = |normal: &Normal| chi_square_deviations(normal, typical);
     let worst = (0..runs.len())
         .max_by(|a, b| deviations(&fit.normals[*a]).total_cmp(&deviations(&fit.normals[*b])))?;

@@ -8,8 +8,10 @@ use crate::noise::Noise;
 use crate::parameters::{Parameter, Parameters};
 use crate::run::Run;
 
-/// Heading up to which a run counts as straight all along \[rad\].
+/// Heading up to which a run counts as straight all along \[rad\], and what nominal radii add that differ by half a
+/// per cent.
 const STRAIGHT: f64 = 0.2;
+const UNEQUAL: f64 = 0.005;
 /// Net turn from which a run counts as an arc \[rad\].
 const ARC: f64 = 0.7;
 /// Share of its travel that a run must go in one direction.
@@ -111,7 +113,8 @@ pub(crate) fn kind(run: &Run, vehicle: &Vehicle, p: &Parameters) -> Kind {
         largest = largest.max(turn.abs());
         end = turn;
     }
-    if largest < STRAIGHT {
+    let track = vehicle.track_rear.max(vehicle.track_front).max(0.1 * vehicle.wheelbase);
+    if largest < STRAIGHT + UNEQUAL * base.travel() / track {
         Kind::Straight
     } else if end.abs() > ARC {
         Kind::Arc

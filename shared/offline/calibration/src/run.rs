@@ -20,6 +20,30 @@ impl Series {
         Self { t, value: counts.iter().map(|count| count * TAU / per_revolution).collect() }
     }
 
+    /// Rotation \[rad\] of a wheel from cumulative counts of `bits` bits that wrap, `per_revolution` to a turn; from 0.
+    ///
+    /// Between two readings the counter moves by less than half its range.
+    #[must_use]
+    pub fn from_wrapping_counts(
+        t: Vec<f64>,
+        counts: &[i64],
+        bits: u32,
+        per_revolution: f64,
+    ) -> Self {
+        let unused = 64 - bits.clamp(1, 64);
+        let mut unwrapped = 0_i64;
+        let mut before = counts.first().copied().unwrap_or(0);
+        let value = counts.iter().map(|count| {
+            unwrapped = unwrapped.wrapping_add(count.wrapping_sub(before) << unused >> unused);
+            before = *count;
+            #[allow(clippy::cast_precision_loss)] // 53 bits of counts are exact
+            let turned = unwrapped as f64;
+            turned * TAU / per_revolution
+        });
+        let value = value.collect();
+        Self { t, value }
+    }
+
     /// Rotation \[rad\] of a wheel from surface speeds \[m/s\] that the vehicle computed with
     /// `radius` \[m\]: the trapezoidal sum, from 0.
     #[must_use]
@@ -163,6 +187,13 @@ mod tests {
         let series = Series { t: vec![0.0, 1.0, 3.0], value: vec![0.0, 2.0, 4.0] };
         let at = [-1.0, 0.5, 1.0, 2.0, 9.0].map(|t| series.at(t));
         assert_eq!(at, [0.0, 1.0, 2.0, 3.0, 4.0]);
+    }
+
+    #[test]
+    fn counters_that_wrap_go_on() {
+        let counts = [32_766, -32_767, -32_760, 32_765];
+        let series = Series::from_wrapping_counts(vec![0.0, 1.0, 2.0, 3.0], &counts, 16, TAU);
+        assert_eq!(series.value, [0.0, 3.0, 10.0, -1.0]);
     }
 
     #[test]

@@ -147,7 +147,8 @@ pub(crate) fn first_start(run: &Condensed, parameters: &Parameters, settings: &S
     let used = Used::of(run);
     let (mut pose, mut at) = (Pose::default(), 0);
     let mut pairs = Vec::new();
-    for event in &run.events {
+    let last = last_for_start(run);
+    for event in run.events.iter().filter(|event| event.after <= last) {
         for block in &run.blocks[at..event.after] {
             let rows = Rows::of_block(block, parameters, &settings.noise, used);
             if let Some(motion) = rows.motion() {
@@ -166,6 +167,13 @@ pub(crate) fn first_start(run: &Condensed, parameters: &Parameters, settings: &S
         }
     }
     lay_onto(&pairs)
+}
+
+/// Blocks up to which a first guess looks: the run's first tenth, or three known poses, before drift spoils it.
+fn last_for_start(run: &Condensed) -> usize {
+    let mut poses = run.events.iter().filter(|event| matches!(event.known, Known::Pose { .. }));
+    let third = poses.nth(2).map_or(run.blocks.len(), |event| event.after);
+    third.max(run.blocks.len() / 10)
 }
 
 /// A pose by dead reckoning, the same by the reference (yaw not a number where unknown), and the deviations of

@@ -1,6 +1,7 @@
 //! Bad input is named by its evidence, and good input is not accused.
 
-#![allow(clippy::expect_used)] // helpers of tests
+#![allow(clippy::expect_used)] // Helpers of tests are tests.
+
 mod support;
 
 use core::f64::consts::{FRAC_PI_2, TAU};
@@ -221,6 +222,36 @@ fn a_stuck_wheel_is_named_also_when_it_sticks_half_way() {
         series(run, 1).value.iter_mut().for_each(|value| *value *= 4.0);
     });
     assert_eq!(found, [Problem::WheelScale(Wheel::FrontRight)]);
+}
+
+#[test]
+fn a_counter_that_jumps_is_named() {
+    let found = problems(left(), |run| {
+        series(run, 0).value[700..].iter_mut().for_each(|value| *value -= 65536.0 / 2000.0 * TAU);
+    });
+    assert_eq!(found, [Problem::Jump(Wheel::FrontLeft)]);
+}
+
+#[test]
+fn a_vehicle_that_turns_on_the_spot_is_not_accused() {
+    let mut vehicle = nominal();
+    vehicle.limits.steering = 1.57;
+    let t: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.02).collect();
+    let turn = |sign: f64| Series { t: t.clone(), value: t.iter().map(|t| sign * t).collect() };
+    let yaw = |t: f64| Some(t * 2.0 * 0.0725 / 0.31);
+    let run = Run {
+        name: "spot".to_owned(),
+        rotation: [None, None, Some(turn(-1.0)), Some(turn(1.0))],
+        reference: t
+            .iter()
+            .step_by(10)
+            .map(|t| kerbside_calibration::ReferencePose { t: *t, x: 1.0, y: 2.0, yaw: yaw(*t) })
+            .collect(),
+        ..Run::default()
+    };
+    let noise = car().settings().noise;
+    let accused = diagnose_runs(&[run], &vehicle, &noise);
+    assert!(accused.iter().all(|finding| !finding.forbids), "{accused:?}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The figures of calibration at a small scale: close to the Cramer-Rao bound, intervals that hold, both methods.
 
-#![allow(clippy::expect_used)] // helpers of tests
+#![allow(clippy::expect_used)] // Helpers of tests are tests.
+
 mod support;
 
 use kerbside_calibration::{

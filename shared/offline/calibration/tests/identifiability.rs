@@ -1,6 +1,7 @@
 //! Which parameters sets of runs identify: the digest's table 3.3.
 
-#![allow(clippy::expect_used)] // helpers of tests
+#![allow(clippy::expect_used)] // Helpers of tests are tests.
+
 mod support;
 
 use core::f64::consts::TAU;

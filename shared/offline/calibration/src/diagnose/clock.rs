@@ -2,6 +2,8 @@
 
 use kerbside_geometry::{Vehicle, angle, math};
 
+use nalgebra::{Matrix2, Vector2};
+
 use super::grid::{Grid, sums};
 use super::{Findings, Problem};
 use crate::noise::Noise;
@@ -17,8 +19,10 @@ const WINDOW: f64 = 1.0;
 /// Readings without which nothing is said, and how far apart they may be \[s\].
 const FEWEST: usize = 20;
 const SPARSEST: f64 = 0.5;
-/// How much better than at offset 0 the motions must agree, in units of what is left per reading.
+/// How much better than at offset 0 the motions must agree, in units of what is left per reading; and the share of
+/// what does not agree at offset 0 that may be left: a nominal vehicle that is wrong disagrees at any offset.
 const BETTER: f64 = 30.0;
+const LEFT: f64 = 0.5;
 
 /// Motion between two readings of the reference.
 struct Stretch {
@@ -56,8 +60,9 @@ pub(crate) fn check(
     #[allow(clippy::cast_precision_loss)] // readings
     let per_reading =
         best.1 / stretches.len() as f64 + 2.0 * noise.position * noise.position * apart / WINDOW;
-    let better = (misfit(0.0) - best.1) / per_reading;
-    if best.0.abs() >= LEAST && better > BETTER {
+    let now = misfit(0.0);
+    let better = (now - best.1) / per_reading;
+    if best.0.abs() >= LEAST && better > BETTER && best.1 < LEFT * now {
         let evidence = format!(
             "its motion is the wheels' of {:.2} s {}",
             best.0.abs(),
@@ -85,8 +90,8 @@ fn stretches(readings: &[ReferencePose]) -> Vec<Stretch> {
     list
 }
 
-/// Sum of squares by which the reference's motion misses the wheels' of `offset` \[s\] earlier \[m^2\]. Scales of both
-/// are free: the nominal vehicle may be wrong.
+/// Sum of squares by which the reference's motion misses the wheels' of `offset` \[s\] earlier \[m^2\]. Distance and turn
+/// are each free in the wheels' distance and turn: radii, tracks and steering zero of the nominal vehicle may be wrong.
 fn misfit(
     grid: &Grid,
     stretches: &[Stretch],
@@ -96,34 +101,40 @@ fn misfit(
 ) -> f64 {
     let between =
         |sums: &[f64], s: &Stretch| grid.at(sums, s.to - offset) - grid.at(sums, s.from - offset);
-    let mut chord = Line::default();
-    let mut heading = Line::default();
+    let mut chord = Plane::default();
+    let mut heading = Plane::default();
     for stretch in stretches {
         let (gone, turned) = (between(distance, stretch), between(turn, stretch));
-        chord.add((gone * math::sinc(0.5 * turned)).abs(), stretch.length);
+        let straight = gone * math::sinc(0.5 * turned);
+        chord.add([straight, turned * lever], stretch.length.copysign(gone));
         if let Some(read) = stretch.turn {
-            heading.add(turned * lever, read * lever);
+            heading.add([gone, turned * lever], read * lever);
         }
     }
     chord.left() + heading.left()
 }
 
-/// Least squares of y = a x.
+/// Least squares of y = a x1 + b x2.
 #[derive(Default)]
-struct Line {
-    xx: f64,
-    xy: f64,
+struct Plane {
+    xx: Matrix2<f64>,
+    xy: Vector2<f64>,
     yy: f64,
 }
 
-impl Line {
-    fn add(&mut self, x: f64, y: f64) {
-        self.xx += x * x;
+impl Plane {
+    fn add(&mut self, x: [f64; 2], y: f64) {
+        let x = Vector2::from(x);
+        self.xx += x * x.transpose();
         self.xy += x * y;
         self.yy += y * y;
     }
 
+    /// Sum of squares that is left.
     fn left(&self) -> f64 {
-        if self.xx > 0.0 { self.yy - self.xy * self.xy / self.xx } else { self.yy }
+        // A regressor that is never there takes nothing.
+        let faint = Matrix2::identity() * (1e-9 * self.xx.trace() + f64::MIN_POSITIVE);
+        let solved = (self.xx + faint).cholesky().map(|inverse| inverse.solve(&self.xy));
+        self.yy - solved.map_or(0.0, |solved| solved.dot(&self.xy))
     }
 }

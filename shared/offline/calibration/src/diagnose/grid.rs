@@ -17,6 +17,8 @@ pub(crate) struct Grid {
     pub(crate) wheels: [Option<Vec<f64>>; 4],
     /// Travel of the rear-axle centre, or the nearest there is \[m\].
     pub(crate) distance: Vec<f64>,
+    /// Mean travel of the axle that the distance is taken from \[m\].
+    axle: Vec<f64>,
     /// Steering reading in the middle of each step \[rad\].
     pub(crate) steering: Option<Vec<f64>>,
     wheelbase: f64,
@@ -57,6 +59,7 @@ impl Grid {
             t,
             wheels,
             distance: Vec::new(),
+            axle: Vec::new(),
             steering,
             wheelbase: vehicle.wheelbase,
             tracks,
@@ -74,7 +77,7 @@ impl Grid {
         let rear = self.wheels[2].is_some() || self.wheels[3].is_some();
         let axle = if rear { [2, 3] } else { [0, 1] };
         let steps = self.steps();
-        self.distance = (0..steps)
+        self.axle = (0..steps)
             .map(|k| {
                 let (mut sum, mut count) = (0.0, 0.0);
                 for wheel in axle {
@@ -83,16 +86,24 @@ impl Grid {
                         count += 1.0;
                     }
                 }
-                let angle = self.steering.as_ref().map_or(0.0, |steering| steering[k]);
-                let along = if rear { 1.0 } else { math::cos(angle) };
-                sum / f64::max(count, 1.0) * along
+                sum / f64::max(count, 1.0)
             })
             .collect();
+        let along = |k: usize| match &self.steering {
+            Some(steering) if !rear => math::cos(steering[k]),
+            _ => 1.0,
+        };
+        self.distance = (0..steps).map(|k| self.axle[k] * along(k)).collect();
     }
 
     /// Travel of a wheel, reverse counted like forward \[m\].
     pub(crate) fn travel(&self, wheel: usize) -> Option<f64> {
         Some(self.wheels[wheel].as_ref()?.iter().map(|step| step.abs()).sum())
+    }
+
+    /// Travel of the axle per step, whatever the direction \[m\].
+    pub(crate) fn rolled(&self) -> Vec<f64> {
+        self.axle.iter().map(|step| step.abs()).collect()
     }
 
     /// Turn per step by the rear wheels \[rad\].
@@ -121,12 +132,8 @@ impl Grid {
         let steering = self.steering.as_ref()?;
         let turn = |k: usize| {
             let rear = self.wheels[2].is_some() || self.wheels[3].is_some();
-            if rear {
-                self.distance[k] * math::tan(steering[k]) / self.wheelbase
-            } else {
-                let front = self.distance[k] / math::cos(steering[k]);
-                front * math::sin(steering[k]) / self.wheelbase
-            }
+            let share = if rear { math::tan(steering[k]) } else { math::sin(steering[k]) };
+            self.axle[k] * share / self.wheelbase
         };
         Some((0..self.steps()).map(turn).collect())
     }
@@ -200,7 +207,7 @@ impl Chord {
 pub(crate) fn chords(run: &Run, grid: &Grid, least: f64) -> Vec<Chord> {
     let distance = sums(&grid.distance);
     let turn = sums(&grid.turn());
-    let rolled = sums(&grid.distance.iter().map(|step| step.abs()).collect::<Vec<_>>());
+    let rolled = sums(&grid.rolled());
     let (from, to) = (grid.t[0], grid.t[grid.t.len() - 1]);
     let readings = run.reference.iter().filter(|r| (from - 0.1..=to + 0.1).contains(&r.t));
     let mut chords = Vec::new();

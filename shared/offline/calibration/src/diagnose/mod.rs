@@ -23,6 +23,8 @@ pub enum Problem {
     NotANumber,
     /// Stamps that do not increase, or fewer readings than stamps.
     Stamps,
+    /// A wheel's count jumps farther than the vehicle can roll: a wrap, a reset, or readings that were lost.
+    Jump(Wheel),
     /// The vehicle hardly moves.
     TooShort,
     /// An arc by name that does not turn, or a case without any turn.
@@ -91,6 +93,7 @@ impl core::fmt::Display for Problem {
         match self {
             Self::NotANumber => write!(f, "a reading is not a number"),
             Self::Stamps => write!(f, "stamps do not increase"),
+            Self::Jump(wheel) => write!(f, "the count of wheel {} jumps", wheel.name()),
             Self::TooShort => write!(f, "too short"),
             Self::NoTurning => write!(f, "no turning"),
             Self::StuckWheel(wheel) => write!(f, "wheel {} is stuck", wheel.name()),
@@ -169,8 +172,12 @@ fn diagnose_run(found: &mut Findings, run: &Run, vehicle: &Vehicle, noise: &Nois
     if !found.list.is_empty() {
         return None;
     }
+    wheels::check_jumps(found, run, vehicle, noise);
+    if !found.list.is_empty() {
+        return None;
+    }
     let mut grid = Grid::new(run, vehicle)?;
-    wheels::check(found, &mut grid, vehicle, noise);
+    wheels::check(found, run, &mut grid, vehicle, noise);
     if !found.list.is_empty() {
         return None;
     }

@@ -79,7 +79,7 @@ pub(crate) fn check(
 
 /// Turns over stretches of travel, by every source on board.
 fn sensors(run: &Run, grid: &Grid, stretch: f64) -> Vec<(Source, Vec<f64>)> {
-    let rolled = sums(&grid.distance.iter().map(|step| step.abs()).collect::<Vec<_>>());
+    let rolled = sums(&grid.rolled());
     let mut ends = vec![0];
     for index in 1..rolled.len() {
         if rolled[index] - rolled[ends[ends.len() - 1]] >= stretch {

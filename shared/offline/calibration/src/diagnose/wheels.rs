@@ -1,10 +1,11 @@
 //! Wheels that stand still, count backwards, or roll a multiple of the others.
 
-use kerbside_geometry::{Vehicle, WHEELS};
+use kerbside_geometry::{Vehicle, WHEELS, math};
 
 use super::grid::{Grid, sums};
 use super::{Findings, Problem};
 use crate::noise::Noise;
+use crate::run::Run;
 
 /// A run shorter than this many wheelbases says nothing.
 const SHORTEST: f64 = 2.0;
@@ -13,11 +14,22 @@ const FEWEST_COUNTS: f64 = 200.0;
 /// A wheel stands still if it rolls less than this share of the others over this many wheelbases.
 const STUCK: f64 = 0.005;
 const STRETCH: f64 = 1.0;
-/// A wheel's travel over the typical one's, beyond which no curve explains it.
+/// A wheel rolls no faster than so many times the vehicle's largest speed, give or take so many wheelbases.
+const FASTEST: f64 = 3.0;
+const SLACK: f64 = 0.1;
+/// A vehicle that gets no farther than this share of its wheels' travel turns on the spot.
+const SPINS: f64 = 0.2;
+/// A wheel's travel over the typical one's, beyond which no curve explains it, at least.
 const MULTIPLE: f64 = 1.67;
 
 /// Leaves the grid's distance with every wheel's sign set right.
-pub(crate) fn check(found: &mut Findings, grid: &mut Grid, vehicle: &Vehicle, noise: &Noise) {
+pub(crate) fn check(
+    found: &mut Findings,
+    run: &Run,
+    grid: &mut Grid,
+    vehicle: &Vehicle,
+    noise: &Noise,
+) {
     let travels: Vec<(usize, f64)> =
         (0..4).filter_map(|wheel| Some((wheel, grid.travel(wheel)?))).collect();
     let typical = typical(&travels);
@@ -28,16 +40,51 @@ pub(crate) fn check(found: &mut Findings, grid: &mut Grid, vehicle: &Vehicle, no
         found.forbid(Problem::TooShort, evidence);
         return;
     }
+    let multiple = multiple(vehicle);
     for (wheel, travel) in &travels {
         if !stuck(found, grid, *wheel, vehicle) {
             let ratio = travel / typical;
-            if !(1.0 / MULTIPLE..=MULTIPLE).contains(&ratio) {
+            if !(1.0 / multiple..=multiple).contains(&ratio) {
                 let evidence = format!("{ratio:.2} times what the others roll");
                 found.forbid(Problem::WheelScale(WHEELS[*wheel]), evidence);
             }
         }
     }
-    signs(found, grid, &travels);
+    if !spins(run, typical) {
+        signs(found, grid, &travels);
+    }
+}
+
+/// Increments that no vehicle of this speed rolls.
+pub(crate) fn check_jumps(found: &mut Findings, run: &Run, vehicle: &Vehicle, noise: &Noise) {
+    for wheel in WHEELS {
+        let Some(series) = &run.rotation[wheel.index()] else { continue };
+        let radius = vehicle.radius[wheel.index()];
+        let slack = 10.0 * noise.quantum[wheel.index()] + SLACK * vehicle.wheelbase;
+        let jump = |k: &usize| {
+            let step = (series.value[*k] - series.value[*k - 1]).abs() * radius;
+            step > FASTEST * vehicle.limits.speed * (series.t[*k] - series.t[*k - 1]) + slack
+        };
+        if let Some(k) = (1..series.len()).find(jump) {
+            let evidence = format!(
+                "by {:.2} m between {} s and {} s",
+                (series.value[k] - series.value[k - 1]) * radius,
+                series.t[k - 1],
+                series.t[k]
+            );
+            found.forbid(Problem::Jump(wheel), evidence);
+        }
+    }
+}
+
+/// Ratio of travels that no curve of the vehicle explains: infinite where it turns about one of its wheels.
+fn multiple(vehicle: &Vehicle) -> f64 {
+    let radius = vehicle.wheelbase / math::tan(vehicle.limits.steering.min(1.57));
+    let half = 0.5 * vehicle.track_rear;
+    if radius <= half {
+        return f64::INFINITY;
+    }
+    MULTIPLE.max(1.2 * (radius + half) / (radius - half))
 }
 
 /// Upper median.
@@ -77,6 +124,14 @@ fn stuck(found: &mut Findings, grid: &Grid, wheel: usize, vehicle: &Vehicle) -> 
         }
     }
     false
+}
+
+/// Whether the vehicle turns on the spot: its wheels roll and the reference stays.
+fn spins(run: &Run, rolled: f64) -> bool {
+    let Some(first) = run.reference.first() else { return false };
+    let away = run.reference.iter().map(|r| math::hypot(r.x - first.x, r.y - first.y));
+    let turned = run.reference.iter().filter_map(|r| Some((r.yaw? - first.yaw?).abs()));
+    away.fold(0.0, f64::max) < SPINS * rolled && turned.fold(0.0, f64::max) > 1.0
 }
 
 /// Wheels that go against the majority count backwards.
