@@ -30,6 +30,8 @@ pub(crate) struct Odometer {
     based: [bool; 4],
     /// Read since the pose took it up.
     fresh: [bool; 4],
+    /// Read when the pose took up the others: its travel since then is theirs.
+    tracked: [bool; 4],
 }
 
 impl Odometer {
@@ -37,7 +39,7 @@ impl Odometer {
     pub(crate) fn new(scales: [WheelScale; 4], needed: [bool; 4]) -> Self {
         let no = [false; 4];
         let zero = [0.0; 4];
-        Self { scales, needed, newest: zero, applied: zero, known: no, based: no, fresh: no }
+        Self { scales, needed, newest: zero, applied: zero, known: no, based: no, fresh: no, tracked: no }
     }
 
     /// Another counter epoch: no travel of the old one means anything.
@@ -50,6 +52,7 @@ impl Odometer {
         self.applied = applied;
         self.based = [true; 4];
         self.fresh = self.known;
+        self.tracked = [true; 4];
     }
 
     /// Takes what `travel` says of the wheels. Differences of cumulative travel alone are used, so
@@ -90,6 +93,11 @@ impl Odometer {
         (0..4).all(|index| !self.needed[index] || self.fresh[index])
     }
 
+    /// The same, without wheels that were not read when the pose took up the others.
+    pub(crate) fn ready_without_lost(&self) -> bool {
+        (0..4).all(|index| !self.needed[index] || self.fresh[index] || !self.tracked[index])
+    }
+
     /// Travel of a wheel that is not yet in the pose \[m\].
     pub(crate) fn unapplied(&self, index: usize) -> f64 {
         self.scales[index].difference(self.newest[index], self.applied[index])
@@ -117,7 +125,12 @@ impl Odometer {
     /// The pose has taken up all that was read.
     pub(crate) fn apply(&mut self) {
         self.applied = self.newest;
-        self.fresh = [false; 4];
+        self.tracked = std::mem::replace(&mut self.fresh, [false; 4]);
+    }
+
+    /// Which wheels tell how far they turned since the pose took them up, all over the same time.
+    pub(crate) fn telling(&self) -> [bool; 4] {
+        core::array::from_fn(|index| self.fresh[index] && self.tracked[index])
     }
 
     /// The newest travels \[m\].

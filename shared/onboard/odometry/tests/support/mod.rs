@@ -3,6 +3,8 @@
 #![allow(dead_code)] // Each test takes what it needs.
 #![allow(clippy::unwrap_used)] // Helpers of tests are tests.
 
+pub(crate) mod scatter;
+
 use kerbside_geometry::{Encoders, Gyro, Limits, Pose, Vehicle, WHEELS};
 use kerbside_messages::{Header, Odometry, Raw, Travel};
 use kerbside_odometry::{
