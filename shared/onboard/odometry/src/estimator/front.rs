@@ -34,7 +34,8 @@ pub(crate) struct Record {
 ///
 /// The paper leaves open whether the front pose is integrated on its own from the start, or from
 /// the last fused pose. With `own` it is the former: successive measurements share all earlier
-/// errors, which the filter takes as independent, and the estimate follows the front axle. Without
+/// errors, which the filter takes as independent, and the estimate follows the front axle; they are
+/// made at every reading, since what counts hide is small beside such a pose's variance. Without
 /// it is the latter: each measurement z is the front axle's motion
 /// applied to the last fused pose, H = I, the update in Joseph form. Front and prediction share
 /// that pose's error, which the filter takes as independent: its estimate is nearly the best there
@@ -79,7 +80,7 @@ impl FrontCorrection {
             pair,
             gate,
             own,
-            block: BLOCK * vehicle.wheelbase,
+            block: if own { 0.0 } else { BLOCK * vehicle.wheelbase },
             quantisation: quantisation(vehicle, metres_per_count),
             anchor: None,
             way: Estimate::default(),

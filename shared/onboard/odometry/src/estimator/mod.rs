@@ -382,6 +382,7 @@ impl Estimator {
                 if read[wheel] { self.wheels.unapplied(wheel) } else { 0.0 }
             }),
             read,
+            begun: self.wheels.beginning(),
             turned,
             gap: self.gap_pending.then_some(self.curvature),
         }

@@ -30,8 +30,10 @@ pub(crate) struct Odometer {
     based: [bool; 4],
     /// Read since the pose took it up.
     fresh: [bool; 4],
-    /// Read when the pose took up the others: its travel since then is theirs.
+    /// A travel was known when the pose was rolled last.
     tracked: [bool; 4],
+    /// Not read between the last two times that the pose was rolled.
+    lost: [bool; 4],
 }
 
 impl Odometer {
@@ -39,7 +41,7 @@ impl Odometer {
     pub(crate) fn new(scales: [WheelScale; 4], needed: [bool; 4]) -> Self {
         let no = [false; 4];
         let zero = [0.0; 4];
-        Self { scales, needed, newest: zero, applied: zero, known: no, based: no, fresh: no, tracked: no }
+        Self { scales, needed, newest: zero, applied: zero, known: no, based: no, fresh: no, tracked: no, lost: no }
     }
 
     /// Another counter epoch: no travel of the old one means anything.
@@ -53,6 +55,7 @@ impl Odometer {
         self.based = [true; 4];
         self.fresh = self.known;
         self.tracked = [true; 4];
+        self.lost = [false; 4];
     }
 
     /// Takes what `travel` says of the wheels. Differences of cumulative travel alone are used, so
@@ -93,9 +96,9 @@ impl Odometer {
         (0..4).all(|index| !self.needed[index] || self.fresh[index])
     }
 
-    /// The same, without wheels that were not read when the pose took up the others.
+    /// The same, without wheels that the pose went on without.
     pub(crate) fn ready_without_lost(&self) -> bool {
-        (0..4).all(|index| !self.needed[index] || self.fresh[index] || !self.tracked[index])
+        (0..4).all(|index| !self.needed[index] || self.fresh[index] || self.lost[index])
     }
 
     /// Travel of a wheel that is not yet in the pose \[m\].
@@ -114,7 +117,7 @@ impl Odometer {
     /// Whether a wheel has turned farther than any can within `elapsed` seconds, `slack` seconds
     /// and a factor allowed for, or may have turned so far that absolute counts no longer tell.
     pub(crate) fn beyond_belief(&self, elapsed: f64, slack: f64, margin: f64) -> bool {
-        (0..4).filter(|index| self.needed[*index]).any(|index| {
+        (0..4).filter(|index| self.needed[*index] && !self.lost[*index]).any(|index| {
             let scale = &self.scales[index];
             let reach = margin * scale.top_speed * (elapsed + slack);
             self.unapplied(index).abs() > reach + 2.0 * scale.metres_per_count
@@ -125,10 +128,17 @@ impl Odometer {
     /// The pose has taken up all that was read.
     pub(crate) fn apply(&mut self) {
         self.applied = self.newest;
-        self.tracked = std::mem::replace(&mut self.fresh, [false; 4]);
+        self.tracked = self.based;
+        self.lost = self.fresh.map(|fresh| !fresh);
+        self.fresh = [false; 4];
     }
 
-    /// Which wheels tell how far they turned since the pose took them up, all over the same time.
+    /// Which wheels were read for the first time: they tell nothing yet.
+    pub(crate) fn beginning(&self) -> [bool; 4] {
+        core::array::from_fn(|index| self.fresh[index] && !self.tracked[index])
+    }
+
+    /// Which wheels tell how far they turned since the pose took them up.
     pub(crate) fn telling(&self) -> [bool; 4] {
         core::array::from_fn(|index| self.fresh[index] && self.tracked[index])
     }

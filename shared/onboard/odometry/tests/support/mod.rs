@@ -87,6 +87,13 @@ impl Car {
         self
     }
 
+    /// It already steers by `angle` \[rad\] and rolls at `speed` \[m/s\] when it is first read: the
+    /// sensors see between readings what was at both ends.
+    pub(crate) fn rolling(mut self, speed: f64, angle: f64) -> Self {
+        (self.speed, self.angle) = (speed, angle);
+        self
+    }
+
     /// Rolls for a period at `speed` \[m/s\] and steering angle `angle` \[rad\].
     pub(crate) fn roll(&mut self, speed: f64, angle: f64) {
         let distance = speed * self.period as f64 * 1e-9;

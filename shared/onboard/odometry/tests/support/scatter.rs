@@ -160,9 +160,13 @@ pub(crate) fn reversed(legs: &[Leg]) -> Vec<Leg> {
 /// Runs a case along `legs`.
 pub(crate) fn run(case: &Case, vehicle: &Vehicle, legs: &[Leg]) -> Outcome {
     let mut outcome = Outcome::default();
+    let mut vehicle = vehicle.clone();
+    if let Some(encoders) = &mut vehicle.encoders {
+        encoders.rate = case.rate;
+    }
     for trial in 0..case.trials {
         let random = Pcg64::seed_from_u64(case.seed.wrapping_mul(1_000_003) + trial);
-        Drive::new(case, vehicle, random).run(legs, &mut outcome);
+        Drive::new(case, &vehicle, random).run(legs, &mut outcome);
     }
     outcome
 }

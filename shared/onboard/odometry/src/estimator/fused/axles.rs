@@ -40,16 +40,24 @@ impl Axle {
     }
 }
 
+/// Slip, and whether the steering angle names the axle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Slip {
+    pub(crate) axle: Axle,
+    pub(crate) evident: bool,
+}
+
 /// The sums after `record`, which were `before` it.
 ///
 /// Rear: mean and difference. Front: the same of the wheels' longitudinal travels, in the wheels'
-/// own directions (per-wheel form). Against the steering angle: each axle's turn beyond its own
+/// own directions (per-wheel form); without a steering sensor, what they rolled beyond what the
+/// rear says, of second order in a direction that lags. Against the steering angle: each axle's turn beyond its own
 /// distance times tan(phi) / L.
 pub(crate) fn sums(before: &AxleSums, state: &State, record: &Record) -> AxleSums {
     let mut sums = *before;
     let measures = state.measures();
     let centre = state.centre(record);
-    if record.gap.is_some() || record.read != [true; 4] || measures.lateral.contains(&0.0) {
+    if record.gap.is_some() || record.read != [true; 4] || !state.square() || measures.lateral.contains(&0.0) {
         sums.lacking = sums.lacking.wrapping_add(1);
         return sums;
     }
@@ -57,7 +65,18 @@ pub(crate) fn sums(before: &AxleSums, state: &State, record: &Record) -> AxleSum
         core::array::from_fn(|wheel| record.travel[wheel] * measures.scale[wheel]);
     let rear = mean_and_turn(travel[2], travel[3], measures.lateral[2]);
     let (left, right) = (measures.front(0, centre).0, measures.front(1, centre).0);
-    let front = mean_and_turn(travel[0] * left[0], travel[1] * right[0], measures.lateral[0]);
+    let front = if record.steered.is_some() {
+        mean_and_turn(travel[0] * left[0], travel[1] * right[0], measures.lateral[0])
+    } else {
+        let predicted = |wheel: usize, direction: [f64; 2]| {
+            direction[0] * (rear.0 - measures.lateral[wheel] * rear.1)
+                + direction[1] * measures.wheelbase * rear.1
+        };
+        let off = (travel[0] - predicted(0, left), travel[1] - predicted(1, right));
+        let more = mean_and_turn(off.0, off.1, measures.lateral[0]);
+        sums.across += 0.25 * (left[1] + right[1]).powi(2) * travel[2].abs().max(travel[3].abs());
+        (rear.0 + more.0, rear.1 + more.1)
+    };
     let across = 0.5 * (travel[0] * left[1] + travel[1] * right[1]);
     sums.way += 0.25 * travel.iter().map(|travel| travel.abs()).sum::<f64>();
     sums.distance += rear.0 - front.0;
@@ -82,13 +101,17 @@ pub(crate) fn slipping(
     state: &State,
     then: &AxleSums,
     now: &AxleSums,
-) -> Option<Axle> {
+) -> Option<Slip> {
     if then.lacking != now.lacking {
         return None;
     }
     let way = now.way - then.way;
     let covariance = state.joint.covariance();
-    let (distance, turn) = variances(setup, state.measures(), covariance, way);
+    let (mut distance, turn) = variances(setup, state.measures(), covariance, way);
+    if way > 0.0 {
+        // The rear's turn moves the front wheels across, and along where they are turned.
+        distance += (now.across - then.across) / way * turn * setup.wheelbase * setup.wheelbase;
+    }
     let (off, turned) = (now.distance - then.distance, now.turn - then.turn);
     let square = off * off / distance + turned * turned / turn;
     if way <= 0.0 || square <= THRESHOLD {
@@ -123,7 +146,7 @@ fn culprit(
     variance: f64,
     then: &AxleSums,
     now: &AxleSums,
-) -> Axle {
+) -> Slip {
     let [front, rear] =
         [0, 1].map(|axle| (now.beyond_steering[axle] - then.beyond_steering[axle]).abs());
     let way = now.way - then.way;
@@ -132,16 +155,17 @@ fn culprit(
     let share = way / setup.wheelbase;
     let least = CONTRADICTION * (variance + steering * share * share).sqrt();
     if setup.steered && rear > least && rear > MARGIN * front {
-        return Axle::Rear;
+        return Slip { axle: Axle::Rear, evident: true };
     }
     if setup.steered && front > least && front > MARGIN * rear {
-        return Axle::Front;
+        return Slip { axle: Axle::Front, evident: true };
     }
     let rolled = |axle: usize| (now.rolled[axle] - then.rolled[axle]).abs();
-    match setup.drive {
+    let axle = match setup.drive {
         Drive::Rear => Axle::Rear,
         Drive::Front => Axle::Front,
         Drive::All if rolled(0) > rolled(1) => Axle::Front,
         Drive::All => Axle::Rear,
-    }
+    };
+    Slip { axle, evident: false }
 }

@@ -45,6 +45,8 @@ pub(crate) struct Block {
     /// Number of the first record, and of records.
     pub(crate) first: u64,
     pub(crate) records: u32,
+    /// Stretches before this one that ended where the next began.
+    chain: u32,
 }
 
 /// What a stretch said.
@@ -79,7 +81,7 @@ impl Block {
     /// A record whose rows gave `increment`.
     pub(crate) fn add(&mut self, number: u64, way: f64, rows: &[Row; ROWS], motion: &Increment) {
         if self.records == 0 {
-            *self = Self { first: number, ..Self::default() };
+            *self = Self { first: number, chain: self.chain, ..Self::default() };
         }
         for (sum, row) in self.sums.iter_mut().zip(rows) {
             let first = self.records == 0;
@@ -111,7 +113,12 @@ impl Block {
 
     /// The stretch is left without a word.
     pub(crate) fn clear(&mut self) {
+        self.begin(0);
+    }
+
+    fn begin(&mut self, chain: u32) {
         self.records = 0;
+        self.chain = chain;
         (self.way, self.distance, self.turn) = (0.0, 0.0, 0.0);
     }
 
@@ -124,7 +131,7 @@ impl Block {
             verdict.first = self.first;
             joint.drift(&setup.drift(self.way, 0.0));
         }
-        self.clear();
+        self.begin(if verdict.learnt { self.chain.saturating_add(1) } else { 0 });
         verdict
     }
 
@@ -202,8 +209,12 @@ impl Block {
         }
     }
 
+    /// What a count hides at the end of a stretch, it shows at the beginning of the next: over n
+    /// stretches in a row counts add q^2/6 to the sum once, not n times. A share of 1/n for the n-th
+    /// adds a little more than that.
     fn variance(&self, setup: &Setup, row: usize) -> f64 {
-        let counted = if row < 4 { setup.quantisation[row] } else { 0.0 };
+        let share = 1.0 / f64::from(self.chain.saturating_add(1));
+        let counted = if row < 4 { share * setup.quantisation[row] } else { 0.0 };
         self.sums[row].variance + counted
     }
 

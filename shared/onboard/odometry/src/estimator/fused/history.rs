@@ -2,6 +2,7 @@
 
 use kerbside_messages::Nanos;
 
+use super::axles::Axle;
 use super::fix::Sighting;
 use super::record::Record;
 use super::setup::Setup;
@@ -71,6 +72,13 @@ impl History {
         for number in from.max(self.oldest())..self.next {
             let excluded = &mut self.records[slot(number, RECORDS)].excluded;
             (0..4).for_each(|wheel| excluded[wheel] |= wheels[wheel]);
+        }
+    }
+
+    /// From record `from` on it is `axle` that slips.
+    pub(crate) fn slip(&mut self, from: u64, axle: Axle) {
+        for number in from.max(self.oldest())..self.next {
+            self.records[slot(number, RECORDS)].slipping = Some(axle);
         }
     }
 

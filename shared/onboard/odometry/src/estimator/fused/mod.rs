@@ -42,9 +42,11 @@ pub(crate) struct Reading {
     /// Since when the wheels may have turned, and until when \[ns\].
     pub(crate) start: Nanos,
     pub(crate) end: Nanos,
-    /// Travel of each wheel since its previous reading \[m\], and whether there is one.
+    /// Travel of each wheel since its previous reading \[m\], whether there is one, and whether it
+    /// is read for the first time.
     pub(crate) travel: [f64; 4],
     pub(crate) read: [bool; 4],
+    pub(crate) begun: [bool; 4],
     pub(crate) turned: Option<Turned>,
     /// Largest curvature \[1/m\], where the path to here was not seen.
     pub(crate) gap: Option<f64>,
@@ -221,13 +223,14 @@ impl Fused {
         });
         let way = sum / count.max(1.0);
         let variance = self.setup.steering_variance;
-        let slipping = self.slipping.map_or([false; 4], Axle::wheels);
         Record {
             start: reading.start,
             end: reading.end,
             travel: reading.travel,
             read: reading.read,
-            excluded: core::array::from_fn(|wheel| self.distrusted[wheel] || slipping[wheel]),
+            begun: reading.begun,
+            excluded: self.distrusted,
+            slipping: self.slipping,
             steered: if self.setup.steered {
                 self.steering.over(way, reading.end, variance)
             } else {
@@ -240,7 +243,8 @@ impl Fused {
     }
 
     /// Compares the axles over the window that ends with record `number`. An axle that begins to
-    /// slip is left out from the window's beginning on, whose number this returns.
+    /// slip, or takes the other's place, is left out from the window's beginning on, whose number
+    /// this returns.
     fn watch_axles(&mut self, number: u64) -> Option<u64> {
         let now = *self.history.record(number)?;
         let mut window = self.window.unwrap_or(number).max(self.history.oldest());
@@ -254,11 +258,16 @@ impl Fused {
         self.window = Some(window);
         let then = self.history.record(window)?.axles;
         let found = axles::slipping(&self.setup, &self.state, &then, &now.axles);
-        let begins = found.is_some() && self.slipping.is_none();
-        self.slipping = found.map(|axle| self.slipping.unwrap_or(axle));
-        let axle = self.slipping.filter(|_| begins)?;
-        self.statistics.gated = self.statistics.gated.wrapping_add(1);
-        self.history.exclude(window, axle.wheels());
+        let begins = self.slipping.is_none();
+        let before = self.slipping;
+        // An axle that was named without evidence gives way to one that is named with it.
+        self.slipping = found.map(|slip| match before {
+            Some(axle) if !slip.evident => axle,
+            _ => slip.axle,
+        });
+        let axle = self.slipping.filter(|_| self.slipping != before)?;
+        self.statistics.gated = self.statistics.gated.wrapping_add(u32::from(begins));
+        self.history.slip(window, axle);
         Some(window)
     }
 

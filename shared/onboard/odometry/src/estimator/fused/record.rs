@@ -2,6 +2,8 @@
 
 use kerbside_messages::Nanos;
 
+use super::axles::Axle;
+
 /// The steering sensor's part of a reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Steered {
@@ -29,16 +31,27 @@ pub(crate) struct Record {
     pub(crate) end: Nanos,
     /// Travel of each wheel's counter \[m\].
     pub(crate) travel: [f64; 4],
-    /// Which wheels tell their travel since the record before.
+    /// Which wheels tell their travel, and which are read for the first time.
     pub(crate) read: [bool; 4],
-    /// Which of them are not believed.
+    pub(crate) begun: [bool; 4],
+    /// Which of them contradict the others.
     pub(crate) excluded: [bool; 4],
+    /// The axle that slips, if one does.
+    pub(crate) slipping: Option<Axle>,
     pub(crate) steered: Option<Steered>,
     pub(crate) turned: Option<Turned>,
     /// The path between the ends is not known but by its largest curvature \[1/m\].
     pub(crate) gap: Option<f64>,
     /// Sums up to this record, of what the axles say.
     pub(crate) axles: AxleSums,
+}
+
+impl Record {
+    /// Which wheels are read and believed.
+    pub(crate) fn believed(&self, wheel: usize) -> bool {
+        let slips = self.slipping.is_some_and(|axle| axle.wheels()[wheel]);
+        self.read[wheel] && !self.excluded[wheel] && !slips
+    }
 }
 
 /// Sums since the history began, for differences over a window.
@@ -54,6 +67,8 @@ pub(crate) struct AxleSums {
     pub(crate) beyond_steering: [f64; 2],
     /// Distance by axle: front, rear \[m\].
     pub(crate) rolled: [f64; 2],
+    /// Way across the body that the front wheels' directions have, squared, times way \[m\].
+    pub(crate) across: f64,
     /// Records in which not both axles told.
     pub(crate) lacking: u32,
 }

@@ -39,6 +39,8 @@ pub(crate) struct Setup {
     /// Variance of the steering angle \[rad^2\].
     pub(crate) steering_variance: f64,
     pub(crate) steered: bool,
+    /// Wheels that report.
+    pub(crate) wheels: [bool; 4],
     /// Length of a block \[m\].
     pub(crate) block: f64,
     /// Test ratio beyond which a wheel is left out of a block, one degree of freedom.
@@ -76,6 +78,7 @@ impl Setup {
             quantisation: scales.map(|scale| scale.metres_per_count.powi(2) / 6.0),
             steering_variance: (steering * steering).max(LEAST_VARIANCE),
             steered: sensors.steering,
+            wheels: sensors.wheels,
             block: BLOCK * vehicle.wheelbase,
             wheel_gate: WHEEL_GATE * settings.gate,
             gate: settings.gate,

@@ -15,6 +15,9 @@ use crate::wheels::elapsed;
 /// Ways are smoothed over so many readings.
 const SMOOTHING: f64 = 1.0 / 8.0;
 
+/// Without a steering sensor the course is smoothed over this share of the wheelbase.
+const COURSE: f64 = 0.02;
+
 /// A block has at most so many records, so that it can be gone through again.
 const LONGEST: u32 = 200;
 
@@ -28,10 +31,22 @@ pub(crate) struct State {
     pending: f64,
     /// Smoothed (distance, L turn), for the direction of front wheels without steering sensor.
     course: [f64; 2],
+    /// What the pose has rolled of each wheel's way that its counter has not told yet.
+    owed: [Owed; 4],
     /// The newest stamp whose record or fix is in it.
     pub(crate) time: Nanos,
     /// What the fix under judgement said.
     pub(crate) judged: Option<Surprise>,
+}
+
+/// A wheel's way while it was not read: its counter tells it with the next reading, and the pose
+/// owes it nothing but the difference.
+#[derive(Clone, Copy, Debug, Default)]
+struct Owed {
+    /// Travel as the others told it \[m\].
+    travel: f64,
+    /// Way meanwhile \[m\].
+    way: f64,
 }
 
 /// What a record did.
@@ -58,6 +73,7 @@ impl State {
             block: Block::default(),
             pending: 0.0,
             course: [0.0; 2],
+            owed: [Owed::default(); 4],
             time: 0,
             judged: None,
         }
@@ -105,6 +121,7 @@ impl State {
         }
         self.pending = solved.rest;
         self.follow(&increment);
+        self.owe(setup, record, &solved);
         self.roll(setup, record, &solved.piece, fixes);
         let full = self.block.way >= setup.block || self.block.records >= LONGEST;
         if full && verdict.is_none_or(|verdict| verdict.suspect.is_none()) {
@@ -186,9 +203,37 @@ impl State {
     fn follow(&mut self, motion: &Increment) {
         let side = if self.course[0] * motion.distance < 0.0 { -1.0 } else { 1.0 };
         let now = [motion.distance, self.measures.wheelbase * motion.turn];
+        let way = now[0].abs() + now[1].abs();
+        let length = COURSE * self.measures.wheelbase;
+        let kept = length / (length + way);
         for (smooth, value) in self.course.iter_mut().zip(now) {
-            *smooth += SMOOTHING * (side * value - *smooth);
+            *smooth = kept * (*smooth + side * value);
         }
+    }
+
+    /// Wheels that this record does not tell of are owed its motion.
+    fn owe(&mut self, setup: &Setup, record: &Record, solved: &Solved) {
+        for wheel in (0..4).filter(|wheel| setup.wheels[*wheel]) {
+            if record.read[wheel] || record.begun[wheel] {
+                self.owed[wheel] = Owed::default();
+                continue;
+            }
+            let row = self.measures.wheel(wheel, 0.0, self.centre(record), 0.0);
+            let motion = &solved.piece.increment;
+            let owed = &mut self.owed[wheel];
+            owed.travel += row.of[0] * motion.distance + row.of[1] * motion.turn;
+            owed.way += if record.gap.is_some() { setup.block } else { solved.way };
+        }
+    }
+
+    /// Whether no wheel is owed anything.
+    pub(crate) fn square(&self) -> bool {
+        self.owed.iter().all(|owed| owed.way == 0.0)
+    }
+
+    /// Travel of a wheel within `record` alone.
+    fn travel(&self, record: &Record, wheel: usize) -> f64 {
+        record.travel[wheel] - self.owed[wheel].travel / self.measures.scale[wheel]
     }
 
     fn solve(&self, setup: &Setup, record: &Record) -> Option<Solved> {
@@ -213,7 +258,7 @@ impl State {
     fn way(&self, record: &Record, centre: (f64, f64)) -> f64 {
         let (mut rolled, mut ways) = (0.0, 0.0);
         for wheel in (0..4).filter(|wheel| record.read[*wheel]) {
-            rolled += record.travel[wheel].abs();
+            rolled += self.travel(record, wheel).abs();
             ways += if wheel < 2 {
                 self.measures.front(wheel, centre).1
             } else {
@@ -232,9 +277,12 @@ impl State {
     ) -> [Row; ROWS] {
         let mut rows = [Row::default(); ROWS];
         for wheel in (0..4).filter(|wheel| record.read[*wheel]) {
-            let noise = setup.wheel_variance[wheel] * way;
-            rows[wheel] = self.measures.wheel(wheel, record.travel[wheel], centre, noise);
-            rows[wheel].used = !record.excluded[wheel];
+            let owed = &self.owed[wheel];
+            let noise = setup.wheel_variance[wheel] * (way + owed.way);
+            let travel = self.travel(record, wheel);
+            rows[wheel] = self.measures.wheel(wheel, travel, centre, noise);
+            rows[wheel].live = owed.way < setup.block;
+            rows[wheel].used = rows[wheel].live && record.believed(wheel);
         }
         if let Some(steered) = &record.steered {
             rows[STEERING] = self.measures.steering(centre, steered.variance * way * way);
