@@ -78,7 +78,11 @@ fn lengths(trials: u64) {
             let legs = straight_legs(length, 0.26, 0.02);
             let legs = if backwards { reversed(&legs) } else { legs };
             let name = format!("{length} m{}", if backwards { " reverse" } else { "" });
-            row(&name, &run(&Case::new(Filter::Fused, 1.0, trials).residual(), &car(), &legs), None);
+            row(
+                &name,
+                &run(&Case::new(Filter::Fused, 1.0, trials).residual(), &car(), &legs),
+                None,
+            );
             let own = Case { filter: Filter::Paper, ..Case::new(Filter::Paper, 1.0, trials) };
             row(&format!("{name} paper"), &run(&own, &car(), &legs), None);
         }

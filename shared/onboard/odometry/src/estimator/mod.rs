@@ -17,8 +17,8 @@ use kerbside_messages::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-use crate::sensors::{NoModel, Sensors};
 use crate::parameters::{ParameterEstimate, ParameterPrior};
+use crate::sensors::{NoModel, Sensors};
 use crate::settings::{EstimatorSettings, Filter, InitialPose};
 use crate::wheels::{self, elapsed};
 use fixes::{Rest, Ruling};
@@ -100,6 +100,8 @@ pub struct Estimator {
     read: Nanos,
     /// Stamp of the newest travel.
     seen: Nanos,
+    /// Since when some wheels were read and others are awaited.
+    awaiting: Option<Nanos>,
     waiting: Option<Fix>,
     verdict: FixVerdict,
     fix_sequence: u64,
@@ -167,6 +169,7 @@ impl Estimator {
             moved: None,
             read: 0,
             seen: 0,
+            awaiting: None,
             waiting: None,
             verdict: FixVerdict::None,
             fix_sequence: 0,
@@ -312,7 +315,7 @@ impl Estimator {
     fn roll(&mut self, travel: &Travel) {
         let stamp = travel.header.stamp;
         let since = elapsed(stamp, self.rolled);
-        if !self.wheels.ready() && !self.goes_without(since) {
+        if !self.wheels.ready() && !self.goes_without(stamp) {
             return;
         }
         if self.gap_pending && self.wheels.beyond_belief(since, GAP_SLACK, GAP_MARGIN) {
@@ -343,10 +346,11 @@ impl Estimator {
     }
 
     /// A wheel was awaited for so long that the fused filter goes on with the others.
-    fn goes_without(&self, since: f64) -> bool {
+    fn goes_without(&mut self, stamp: Nanos) -> bool {
+        let since = *self.awaiting.get_or_insert(stamp);
         self.fused.is_some()
             && self.wheels.telling().contains(&true)
-            && (since > LONGEST_AWAITING || self.wheels.ready_without_lost())
+            && (elapsed(stamp, since) > LONGEST_AWAITING || self.wheels.ready_without_lost())
     }
 
     /// The same with the fused filter.
@@ -383,6 +387,7 @@ impl Estimator {
             }),
             read,
             begun: self.wheels.beginning(),
+            aligned: self.wheels.aligned(),
             turned,
             gap: self.gap_pending.then_some(self.curvature),
         }
@@ -400,6 +405,7 @@ impl Estimator {
 
     fn applied(&mut self, stamp: Nanos, distance: f64, turn: f64) {
         self.wheels.apply();
+        self.awaiting = None;
         self.rolled = stamp;
         self.twist.push(stamp, distance, turn);
     }

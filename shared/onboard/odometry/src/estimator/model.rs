@@ -9,8 +9,8 @@ use super::gyro::GyroIntegral;
 use super::increment::Increment;
 use super::kinematics::{FrontPair, GyroWheel, RearPair, SteeredWheel};
 use super::odometer::Odometer;
-use crate::sensors::{NoModel, Sensors};
 use crate::parameters::ParameterPrior;
+use crate::sensors::{NoModel, Sensors};
 use crate::settings::{EstimatorSettings, Filter};
 use crate::wheels::WheelScale;
 

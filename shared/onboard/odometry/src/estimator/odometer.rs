@@ -34,6 +34,9 @@ pub(crate) struct Odometer {
     tracked: [bool; 4],
     /// Not read between the last two times that the pose was rolled.
     lost: [bool; 4],
+    /// Read with the newest travel, and with that with which the pose was rolled last.
+    now: [bool; 4],
+    then: [bool; 4],
 }
 
 impl Odometer {
@@ -41,7 +44,19 @@ impl Odometer {
     pub(crate) fn new(scales: [WheelScale; 4], needed: [bool; 4]) -> Self {
         let no = [false; 4];
         let zero = [0.0; 4];
-        Self { scales, needed, newest: zero, applied: zero, known: no, based: no, fresh: no, tracked: no, lost: no }
+        Self {
+            scales,
+            needed,
+            newest: zero,
+            applied: zero,
+            known: no,
+            based: no,
+            fresh: no,
+            tracked: no,
+            lost: no,
+            now: no,
+            then: no,
+        }
     }
 
     /// Another counter epoch: no travel of the old one means anything.
@@ -56,6 +71,7 @@ impl Odometer {
         self.fresh = self.known;
         self.tracked = [true; 4];
         self.lost = [false; 4];
+        self.then = [true; 4];
     }
 
     /// Takes what `travel` says of the wheels. Differences of cumulative travel alone are used, so
@@ -63,6 +79,7 @@ impl Odometer {
     pub(crate) fn read(&mut self, travel: &Travel) -> Brought {
         let mut brought = Brought::default();
         let mut unusable = false;
+        self.now = [false; 4];
         for index in 0..4 {
             let status = travel.wheel(index);
             if matches!(status, WheelStatus::Valid | WheelStatus::Zeroed) {
@@ -83,6 +100,7 @@ impl Odometer {
         let before = std::mem::replace(&mut self.newest[index], travel);
         let turned = self.known[index] && travel != before;
         self.known[index] = true;
+        self.now[index] = true;
         self.fresh[index] = true;
         if !self.based[index] {
             self.applied[index] = travel;
@@ -131,6 +149,13 @@ impl Odometer {
         self.tracked = self.based;
         self.lost = self.fresh.map(|fresh| !fresh);
         self.fresh = [false; 4];
+        self.then = self.now;
+    }
+
+    /// Which wheels tell it over the very time since the pose was rolled last: their readings are
+    /// of one moment, then and now.
+    pub(crate) fn aligned(&self) -> [bool; 4] {
+        core::array::from_fn(|index| self.now[index] && self.then[index])
     }
 
     /// Which wheels were read for the first time: they tell nothing yet.

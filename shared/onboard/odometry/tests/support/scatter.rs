@@ -7,7 +7,9 @@
 
 use kerbside_geometry::{Pose, Vehicle, WHEELS};
 use kerbside_messages::{Header, Raw, WheelUse};
-use kerbside_odometry::{Estimator, EstimatorSettings, Filter, PARAMETERS, ParameterPrior, Sensors};
+use kerbside_odometry::{
+    Estimator, EstimatorSettings, Filter, PARAMETERS, ParameterPrior, Sensors,
+};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -198,16 +200,12 @@ impl<'a> Drive<'a> {
         true_vehicle.wheelbase += drawn[6];
         let front = NOISE * case.front.sqrt();
         let noise = [front, front, NOISE, NOISE];
-        let settings = EstimatorSettings {
-            filter: case.filter,
-            steering_noise: STEERING_NOISE,
-            ..placed()
-        };
+        let settings =
+            EstimatorSettings { filter: case.filter, steering_noise: STEERING_NOISE, ..placed() };
         let mut prior = ParameterPrior::independent(case.believed);
         prior.wheel_noise = Some(noise);
         let mut chain = Chain::with(vehicle, &case.sensors, &settings);
-        chain.estimator =
-            Estimator::with_prior(vehicle, &case.sensors, &settings, &prior).unwrap();
+        chain.estimator = Estimator::with_prior(vehicle, &case.sensors, &settings, &prior).unwrap();
         let rolled = core::array::from_fn(|_| random.random_range(0.0..0.01));
         Self {
             case,

@@ -57,7 +57,12 @@ pub(crate) fn sums(before: &AxleSums, state: &State, record: &Record) -> AxleSum
     let mut sums = *before;
     let measures = state.measures();
     let centre = state.centre(record);
-    if record.gap.is_some() || record.read != [true; 4] || !state.square() || measures.lateral.contains(&0.0) {
+    if record.gap.is_some()
+        || record.read != [true; 4]
+        || !state.square()
+        || !state.steers(record)
+        || measures.lateral.contains(&0.0)
+    {
         sums.lacking = sums.lacking.wrapping_add(1);
         return sums;
     }

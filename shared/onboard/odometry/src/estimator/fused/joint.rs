@@ -122,8 +122,7 @@ impl Joint {
 
     /// Covariance of the measurement `gradient` with pose and parameters, and its own variance.
     pub(crate) fn spread(&self, gradient: &Gradient) -> (Gradient, f64) {
-        let pose =
-            self.pose_pose * gradient.pose + self.pose_parameters * gradient.parameters;
+        let pose = self.pose_pose * gradient.pose + self.pose_parameters * gradient.parameters;
         let parameters = self.pose_parameters.transpose() * gradient.pose
             + self.parameters * gradient.parameters;
         let own = gradient.pose.dot(&pose) + gradient.parameters.dot(&parameters);

@@ -47,6 +47,8 @@ pub(crate) struct Reading {
     pub(crate) travel: [f64; 4],
     pub(crate) read: [bool; 4],
     pub(crate) begun: [bool; 4],
+    /// Whether its readings are of the same moments as those of the others.
+    pub(crate) aligned: [bool; 4],
     pub(crate) turned: Option<Turned>,
     /// Largest curvature \[1/m\], where the path to here was not seen.
     pub(crate) gap: Option<f64>,
@@ -229,6 +231,7 @@ impl Fused {
             travel: reading.travel,
             read: reading.read,
             begun: reading.begun,
+            aligned: reading.aligned,
             excluded: self.distrusted,
             slipping: self.slipping,
             steered: if self.setup.steered {

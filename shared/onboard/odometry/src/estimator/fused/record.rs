@@ -34,6 +34,8 @@ pub(crate) struct Record {
     /// Which wheels tell their travel, and which are read for the first time.
     pub(crate) read: [bool; 4],
     pub(crate) begun: [bool; 4],
+    /// Which of them at the same moments as the others.
+    pub(crate) aligned: [bool; 4],
     /// Which of them contradict the others.
     pub(crate) excluded: [bool; 4],
     /// The axle that slips, if one does.
@@ -47,6 +49,11 @@ pub(crate) struct Record {
 }
 
 impl Record {
+    /// Whether the rear wheels alone tell the motion, whatever the path was.
+    pub(crate) fn rear_tells(&self) -> bool {
+        [2, 3].into_iter().all(|wheel| self.believed(wheel) && self.aligned[wheel])
+    }
+
     /// Which wheels are read and believed.
     pub(crate) fn believed(&self, wheel: usize) -> bool {
         let slips = self.slipping.is_some_and(|axle| axle.wheels()[wheel]);

@@ -114,10 +114,8 @@ impl Measures {
             return Row { live: true, used: true, reading, of: [1.0, -y], variance, per_turn, own };
         }
         let ([cos, sin], way) = self.front(wheel, centre);
-        let per_turn = [
-            (Parameter::TrackFront.index(), -half * cos),
-            (Parameter::Wheelbase.index(), sin),
-        ];
+        let per_turn =
+            [(Parameter::TrackFront.index(), -half * cos), (Parameter::Wheelbase.index(), sin)];
         let of = [cos, sin * self.wheelbase - y * cos];
         Row { live: true, used: true, reading, of, variance: noise * way, per_turn, own }
     }

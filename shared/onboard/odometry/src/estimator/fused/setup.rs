@@ -13,7 +13,7 @@ const BLOCK: f64 = 0.1;
 
 /// Way after which a parameter is as uncertain as its prior says by change alone: tyres wear, loads
 /// and pressures change \[m\].
-const MEMORY: f64 = 2500.0;
+const MEMORY: f64 = 1e5;
 
 /// Random walk of a gyro's bias \[rad/s/sqrt(s)\].
 const BIAS_WALK: f64 = 5e-5;

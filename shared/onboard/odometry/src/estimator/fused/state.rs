@@ -18,6 +18,9 @@ const SMOOTHING: f64 = 1.0 / 8.0;
 /// Without a steering sensor the course is smoothed over this share of the wheelbase.
 const COURSE: f64 = 0.02;
 
+/// And known after so many times that way.
+const SEEN: f64 = 4.0;
+
 /// A block has at most so many records, so that it can be gone through again.
 const LONGEST: u32 = 200;
 
@@ -31,6 +34,8 @@ pub(crate) struct State {
     pending: f64,
     /// Smoothed (distance, L turn), for the direction of front wheels without steering sensor.
     course: [f64; 2],
+    /// Way over which the course was seen \[m\].
+    seen: f64,
     /// What the pose has rolled of each wheel's way that its counter has not told yet.
     owed: [Owed; 4],
     /// The newest stamp whose record or fix is in it.
@@ -73,6 +78,7 @@ impl State {
             block: Block::default(),
             pending: 0.0,
             course: [0.0; 2],
+            seen: 0.0,
             owed: [Owed::default(); 4],
             time: 0,
             judged: None,
@@ -98,6 +104,11 @@ impl State {
         (side * distance / length, side * across / length)
     }
 
+    /// Whether the front wheels' direction is known.
+    pub(crate) fn steers(&self, record: &Record) -> bool {
+        record.steered.is_some() || self.seen > SEEN * COURSE * self.measures.wheelbase
+    }
+
     /// Carries the state over `record`, with the `fixes` of that time in order. None, and nothing
     /// changed, where the record does not tell the motion.
     pub(crate) fn apply(
@@ -113,6 +124,7 @@ impl State {
         let mut verdict = None;
         if record.gap.is_some() {
             self.block.clear();
+            self.seen = 0.0;
         } else if self.block.reverses(increment.distance) {
             verdict = Some(self.close(setup, hold));
         }
@@ -163,7 +175,7 @@ impl State {
         let bend = curvature * distance;
         let across = (bend / 8.0).min(1.0) * distance;
         let along = (bend * bend / 24.0).min(1.0) * distance;
-        let yaw = if record.read[2] && record.read[3] { 0.0 } else { 0.5 * bend };
+        let yaw = if record.rear_tells() { 0.0 } else { 0.5 * bend };
         self.joint.blur(along, across, yaw);
     }
 
@@ -206,6 +218,7 @@ impl State {
         let way = now[0].abs() + now[1].abs();
         let length = COURSE * self.measures.wheelbase;
         let kept = length / (length + way);
+        self.seen += way;
         for (smooth, value) in self.course.iter_mut().zip(now) {
             *smooth = kept * (*smooth + side * value);
         }
@@ -242,8 +255,10 @@ impl State {
         let whole = record.gap.is_some() || pending > setup.block;
         let way = if whole { pending } else { SMOOTHING * pending };
         let mut rows = self.rows(setup, record, centre, way);
-        if record.gap.is_some() {
-            across_gap(&mut rows);
+        if record.gap.is_some() && record.rear_tells() {
+            rows.iter_mut()
+                .enumerate()
+                .for_each(|(index, row)| row.used &= index == 2 || index == 3);
         }
         let piece = rows::solve(&mut rows, setup.wheelbase).or_else(|| {
             rows = self.rows(setup, record, centre, way);
@@ -268,20 +283,15 @@ impl State {
         if ways > 0.0 { rolled / ways } else { 0.0 }
     }
 
-    fn rows(
-        &self,
-        setup: &Setup,
-        record: &Record,
-        centre: (f64, f64),
-        way: f64,
-    ) -> [Row; ROWS] {
+    fn rows(&self, setup: &Setup, record: &Record, centre: (f64, f64), way: f64) -> [Row; ROWS] {
         let mut rows = [Row::default(); ROWS];
         for wheel in (0..4).filter(|wheel| record.read[*wheel]) {
             let owed = &self.owed[wheel];
             let noise = setup.wheel_variance[wheel] * (way + owed.way);
             let travel = self.travel(record, wheel);
             rows[wheel] = self.measures.wheel(wheel, travel, centre, noise);
-            rows[wheel].live = owed.way < setup.block;
+            rows[wheel].live = owed.way < setup.block
+                && (wheel >= 2 || self.steers(record) || record.gap.is_some());
             rows[wheel].used = rows[wheel].live && record.believed(wheel);
         }
         if let Some(steered) = &record.steered {
@@ -291,15 +301,6 @@ impl State {
             rows[GYRO] = self.measures.gyro(turned.turn, turned.variance, turned.time);
         }
         rows
-    }
-}
-
-/// Over a gap the rear axle alone tells the heading, where it is there; else all rows must do.
-fn across_gap(rows: &mut [Row; ROWS]) {
-    if rows[2].used && rows[3].used {
-        for (index, row) in rows.iter_mut().enumerate() {
-            row.used &= index == 2 || index == 3;
-        }
     }
 }
 
