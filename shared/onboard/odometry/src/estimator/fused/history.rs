@@ -53,10 +53,6 @@ impl History {
         self.fix_count = 0;
     }
 
-    pub(crate) fn next(&self) -> u64 {
-        self.next
-    }
-
     /// Number of the oldest record that is kept.
     pub(crate) fn oldest(&self) -> u64 {
         self.first.max(self.next.saturating_sub(RECORDS as u64))
