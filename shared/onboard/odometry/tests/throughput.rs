@@ -1,6 +1,8 @@
 //! How long a reading takes: `cargo test --release -p kerbside-odometry --test throughput --
 //! --ignored --nocapture`.
 
+#![allow(clippy::unwrap_used)] // Helpers of tests are tests.
+
 mod support;
 
 use std::time::Instant;

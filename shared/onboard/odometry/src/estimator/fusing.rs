@@ -1,6 +1,6 @@
 //! The fused filter's way through the estimator.
 
-use kerbside_messages::{EstimatorState, Fix, FixVerdict, Nanos, Travel};
+use kerbside_messages::{EstimatorState, Fix, FixVerdict, Nanos, ResetReason, Travel};
 
 use super::Estimator;
 use super::fused::{Reading, Taken, Turned};
@@ -61,10 +61,9 @@ impl Estimator {
     /// A vehicle that stands does not turn: what the gyro reads is its bias.
     pub(super) fn rest(&mut self, travel: &Travel) {
         self.gyro.clear();
-        if let Some(fused) = self.fused.as_mut().filter(|_| self.uses_gyro) {
-            if travel.yaw_rate_is_new == 1 {
-                fused.rest(travel.yaw_rate, self.gyro.rate_variance());
-            }
+        let reads = self.uses_gyro && travel.yaw_rate_is_new == 1;
+        if let Some(fused) = self.fused.as_mut().filter(|_| reads) {
+            fused.rest(travel.yaw_rate, self.gyro.rate_variance());
         }
     }
 
@@ -76,6 +75,11 @@ impl Estimator {
         let taken = self.fused.as_mut().filter(|_| judged && valid).map(|fused| fused.fix(fix));
         if let (Some(Taken::Corrected), Some(fused)) = (taken, &self.fused) {
             self.estimate = fused.estimate();
+            self.restorable = false;
+            // A configured pose that a fix agrees with is not a mere claim any more.
+            if self.reason == ResetReason::Initial {
+                self.reason = ResetReason::Fix;
+            }
             return FixVerdict::Accepted;
         }
         if ruled == FixVerdict::Accepted {

@@ -55,15 +55,22 @@ pub struct EstimatorInputs<'a> {
 /// Increments are differences of cumulative travel between what was read and what the pose stands
 /// for, so a lost sample or an unread wheel loses nothing: its motion comes with the next reading.
 /// While one wheel of the model is awaited the pose waits, and the covariance published meanwhile
-/// contains what the other wheels say has been rolled. An increment over a gap is one arc, its
+/// contains what the other wheels say has been rolled; the fused filter goes on without it after
+/// 0.3 s, where the others tell the motion. An increment over a gap is one arc, its
 /// covariance enlarged by how far a path of the vehicle's largest curvature can leave it.
 ///
 /// # The pose's fate
 /// Without an initial pose it is relative to the start (`Unset`). A fix at standstill makes it
-/// `Valid`. A new counter epoch, or a gap over which no wheel can have turned so far, makes a valid
-/// pose `Lost`; it goes on from where it was, without a jump, until a fix comes. [`Restore`] is
-/// taken up once, if this life has no pose from a fix: its pose plus what rolled by since; from
-/// another counter epoch it is lost.
+/// `Valid`; the fused filter then takes further fixes in motion as well, each at its own time, late
+/// and out of order as far back as the last 512 readings in which a wheel turned, and refuses what
+/// its gate refuses. A fix that contradicts the pose of a vehicle that stands sets it. A new counter
+/// epoch, or a gap over which no wheel can have turned so far, makes a valid pose `Lost`; it goes on
+/// from where it was, without a jump, until a fix comes. [`Restore`] is taken up once, if this life
+/// has no pose from a fix: its pose plus what rolled by since; from another counter epoch it is
+/// lost.
+///
+/// What the fused filter had learnt of the parameters is not restored: it begins with the prior and
+/// twice the covariance of the pose, which bounds what both had in common.
 ///
 /// A life that is to be restored must not be given an initial pose: that would be published as
 /// valid until the restore arrives.

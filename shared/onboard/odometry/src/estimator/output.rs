@@ -83,7 +83,6 @@ impl Estimator {
             filter: filter_kind(self.settings.filter).code(),
             wheel_use: self.wheel_use().map(WheelUse::code),
             fix_sequence: self.fix_sequence,
-            ..Odometry::default()
         };
     }
 }

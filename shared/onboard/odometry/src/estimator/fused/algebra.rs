@@ -1,11 +1,8 @@
 //! Rows of a stretch without its motion, and what is left of them as a measurement.
 
-use nalgebra::SVector;
-
 use super::block::Sum;
 use super::joint::{Joint, Values};
 use super::rows::ROWS;
-use crate::parameters::PARAMETERS;
 
 /// The rows of a stretch without the motion: unit variance, independent.
 #[derive(Clone, Copy, Debug, Default)]
@@ -77,20 +74,17 @@ impl System {
     }
 
     fn reflect_rest(&mut self, mirror: &[f64; ROWS], factor: f64) {
+        let rows = &mut self.rows;
         let mut parameters = Values::zeros();
         let mut readings = [0.0; ROWS];
-        for row in 0..self.count {
-            parameters += self.rows.by_parameters[row] * mirror[row];
-            (0..ROWS).for_each(|sensor| {
-                readings[sensor] += self.rows.by_reading[row][sensor] * mirror[row];
-            });
+        for (row, entry) in mirror.iter().enumerate() {
+            parameters += rows.by_parameters[row] * *entry;
+            (0..ROWS).for_each(|sensor| readings[sensor] += rows.by_reading[row][sensor] * entry);
         }
-        for row in 0..self.count {
-            let share = factor * mirror[row];
-            self.rows.by_parameters[row] -= parameters * share;
-            (0..ROWS).for_each(|sensor| {
-                self.rows.by_reading[row][sensor] -= readings[sensor] * share;
-            });
+        for (row, entry) in mirror.iter().enumerate() {
+            let share = factor * entry;
+            rows.by_parameters[row] -= parameters * share;
+            (0..ROWS).for_each(|sensor| rows.by_reading[row][sensor] -= readings[sensor] * share);
         }
     }
 }
@@ -103,14 +97,14 @@ pub(crate) struct Factor {
 
 impl Factor {
     pub(crate) fn new(rows: &Projected, joint: &Joint) -> Option<Self> {
-        let mut lower = [[0.0; ROWS]; ROWS];
-        for row in 0..rows.count {
-            let spread: SVector<f64, PARAMETERS> = joint.covariance() * rows.by_parameters[row];
-            for column in row..rows.count {
+        let spread: [Values; ROWS] =
+            core::array::from_fn(|row| joint.covariance() * rows.by_parameters[row]);
+        let mut lower: [[f64; ROWS]; ROWS] = core::array::from_fn(|row| {
+            core::array::from_fn(|column| {
                 let unit = if row == column { 1.0 } else { 0.0 };
-                lower[column][row] = unit + rows.by_parameters[column].dot(&spread);
-            }
-        }
+                unit + rows.by_parameters[row].dot(&spread[column])
+            })
+        });
         for column in 0..rows.count {
             for row in column..rows.count {
                 let mut entry = lower[row][column];

@@ -1,9 +1,9 @@
 //! A stretch of path after which the parameters learn from what the sensors disagree about.
 //!
-//! All rows of a stretch share two unknowns, distance and turn; what m rows say beyond these are m
-//! - 2 numbers that are free of the motion, and, since the motion was solved with the same weights,
-//! free of its error: a measurement of the parameters alone. It corrects the pose through the
-//! covariance that both have in common.
+//! All rows of a stretch share two unknowns, distance and turn. What they say beyond these is free
+//! of the motion and, since the motion was solved with the same weights, of its error: a
+//! measurement of the parameters alone. It corrects the pose through the covariance that both have
+//! in common.
 
 use kerbside_geometry::math;
 

@@ -93,7 +93,7 @@ impl History {
     }
 
     fn keep(&mut self, number: u64, state: &State) {
-        if number % STRIDE == 0 || number == self.first {
+        if number.is_multiple_of(STRIDE) || number == self.first {
             self.states[slot(number / STRIDE, STATES)] = Kept { number, state: *state };
         }
     }
