@@ -2,26 +2,30 @@
 
 mod fixes;
 mod front;
+mod fused;
+mod fusing;
 mod gyro;
 mod increment;
 mod kinematics;
 mod model;
 mod odometer;
+mod output;
 mod twist;
 mod update;
 
 use kerbside_geometry::{Pose, Vehicle};
 use kerbside_messages::{
-    EstimatorState, Fix, FixVerdict, Header, Nanos, Odometry, ResetReason, Restore, Travel,
-    WheelStatus,
+    EstimatorState, Fix, FixVerdict, Nanos, Odometry, ResetReason, Restore, Travel, WheelStatus,
 };
 use nalgebra::{Matrix3, Vector3};
 
+use crate::parameters::{ParameterEstimate, ParameterPrior};
 use crate::sensors::{NoModel, Sensors};
-use crate::settings::{EstimatorSettings, InitialPose};
+use crate::settings::{EstimatorSettings, Filter, InitialPose};
 use crate::wheels::{self, elapsed};
 use fixes::{Rest, Ruling};
 use front::FrontCorrection;
+use fused::{Fused, Setup};
 use gyro::GyroIntegral;
 pub use increment::{Estimate, Increment};
 use model::{Aids, Model};
@@ -52,15 +56,22 @@ pub struct EstimatorInputs<'a> {
 /// Increments are differences of cumulative travel between what was read and what the pose stands
 /// for, so a lost sample or an unread wheel loses nothing: its motion comes with the next reading.
 /// While one wheel of the model is awaited the pose waits, and the covariance published meanwhile
-/// contains what the other wheels say has been rolled. An increment over a gap is one arc, its
+/// contains what the other wheels say has been rolled; the fused filter goes on without it after
+/// 0.3 s, where the others tell the motion. An increment over a gap is one arc, its
 /// covariance enlarged by how far a path of the vehicle's largest curvature can leave it.
 ///
 /// # The pose's fate
 /// Without an initial pose it is relative to the start (`Unset`). A fix at standstill makes it
-/// `Valid`. A new counter epoch, or a gap over which no wheel can have turned so far, makes a valid
-/// pose `Lost`; it goes on from where it was, without a jump, until a fix comes. [`Restore`] is
-/// taken up once, if this life has no pose from a fix: its pose plus what rolled by since; from
-/// another counter epoch it is lost.
+/// `Valid`; the fused filter then takes further fixes in motion as well, each at its own time, late
+/// and out of order as far back as the last 512 readings in which a wheel turned, and refuses what
+/// its gate refuses. A fix that contradicts the pose of a vehicle that stands sets it. A new counter
+/// epoch, or a gap over which no wheel can have turned so far, makes a valid pose `Lost`; it goes on
+/// from where it was, without a jump, until a fix comes. [`Restore`] is taken up once, if this life
+/// has no pose from a fix: its pose plus what rolled by since; from another counter epoch it is
+/// lost.
+///
+/// What the fused filter had learnt of the parameters is not restored: it begins with the prior and
+/// twice the covariance of the pose, which bounds what both had in common.
 ///
 /// A life that is to be restored must not be given an initial pose: that would be published as
 /// valid until the restore arrives.
@@ -72,10 +83,12 @@ pub struct EstimatorInputs<'a> {
 pub struct Estimator {
     model: Model,
     front: Option<FrontCorrection>,
+    fused: Option<Fused>,
     settings: EstimatorSettings,
     curvature: f64,
     wheels: Odometer,
     gyro: GyroIntegral,
+    uses_gyro: bool,
     steering: Option<f64>,
     twist: Twist,
     estimate: Estimate,
@@ -91,6 +104,10 @@ pub struct Estimator {
     rolled: Nanos,
     moved: Option<Nanos>,
     read: Nanos,
+    /// Stamp of the newest travel.
+    seen: Nanos,
+    /// Since when some wheels were read and others are awaited.
+    awaiting: Option<Nanos>,
     waiting: Option<Fix>,
     verdict: FixVerdict,
     fix_sequence: u64,
@@ -114,13 +131,32 @@ impl Estimator {
         sensors: &Sensors,
         settings: &EstimatorSettings,
     ) -> Result<Self, NoModel> {
+        let prior = ParameterPrior::calibrated(vehicle);
+        Self::with_prior(vehicle, sensors, settings, &prior)
+    }
+
+    /// A stage for `vehicle` whose calibration left open what `prior` says.
+    ///
+    /// # Errors
+    /// [`NoModel`] where no pose can be computed from what it measures.
+    pub fn with_prior(
+        vehicle: &Vehicle,
+        sensors: &Sensors,
+        settings: &EstimatorSettings,
+        prior: &ParameterPrior,
+    ) -> Result<Self, NoModel> {
         let scales = wheels::scales(vehicle, sensors)?;
-        let (model, front) = Model::new(vehicle, sensors, settings, &scales)?;
+        let (model, front) = Model::new(vehicle, sensors, settings, prior, &scales)?;
+        let fused = (settings.filter == Filter::Fused)
+            .then(|| Fused::new(Setup::new(vehicle, sensors, settings, prior, &scales)));
+        let uses_gyro = model.uses_gyro() || fused.is_some() && sensors.gyro;
         let gyro_noise = vehicle.gyro.map_or(settings.gyro_noise, |gyro| gyro.noise);
         let mut estimator = Self {
             wheels: Odometer::new(scales, model.needed()),
             model,
             front,
+            fused,
+            uses_gyro,
             settings: settings.clone(),
             curvature: wheels::largest_curvature(vehicle),
             gyro: GyroIntegral::new(gyro_noise),
@@ -138,6 +174,8 @@ impl Estimator {
             rolled: 0,
             moved: None,
             read: 0,
+            seen: 0,
+            awaiting: None,
             waiting: None,
             verdict: FixVerdict::None,
             fix_sequence: 0,
@@ -156,9 +194,6 @@ impl Estimator {
         if let Some(restore) = inputs.restore {
             self.take_restore(restore, travel);
         }
-        if let Some(front) = &mut self.front {
-            front.record_mut().corrected = false;
-        }
         self.take_aids(travel);
         let brought = self.take_wheels(travel);
         self.gap_pending |= gap || brought.bridged;
@@ -167,10 +202,17 @@ impl Estimator {
         }
         self.unusable = self.unusable.wrapping_add(u32::from(brought.lacking));
         if self.standstill(travel.header.stamp) {
-            self.gyro.clear();
+            self.rest(travel);
         }
+        self.seen = travel.header.stamp;
         self.take_fix(inputs.fix, travel.header.stamp);
         self.write(travel, gap, out);
+    }
+
+    /// What the fused filter has learnt of the vehicle's parameters; none for other filters.
+    #[must_use]
+    pub fn parameters(&self) -> Option<ParameterEstimate> {
+        self.fused.as_ref().map(Fused::parameters)
     }
 
     /// Another counter epoch: what rolled by since the last travel is not known.
@@ -200,6 +242,9 @@ impl Estimator {
         if let Some(front) = &mut self.front {
             front.restart();
         }
+        if let Some(fused) = &mut self.fused {
+            fused.place(&self.estimate);
+        }
     }
 
     /// Takes up what an earlier life knew; what rolled by since is the next increment.
@@ -220,6 +265,10 @@ impl Estimator {
             return;
         }
         self.jump(estimate, EstimatorState::Valid, ResetReason::Restored);
+        if let Some(fused) = &mut self.fused {
+            fused.inherit(&estimate);
+            self.estimate = fused.estimate();
+        }
         self.wheels.restore(known.travel);
         self.gap_pending = true;
         self.rolled = known.header.stamp;
@@ -239,13 +288,24 @@ impl Estimator {
             record.corrections = record.corrections.wrapping_add(known.corrections);
             record.gated = record.gated.wrapping_add(known.gated);
         }
+        if let Some(fused) = &mut self.fused {
+            let statistics = fused.statistics_mut();
+            statistics.corrections = statistics.corrections.wrapping_add(known.corrections);
+            statistics.gated = statistics.gated.wrapping_add(known.gated);
+        }
     }
 
     fn take_aids(&mut self, travel: &Travel) {
         if travel.has_steering == 1 {
             self.steering = Some(travel.steering);
         }
-        if self.model.uses_gyro() {
+        if let Some(front) = &mut self.front {
+            front.record_mut().corrected = false;
+        }
+        if let Some(fused) = &mut self.fused {
+            fused.look(travel);
+        }
+        if self.uses_gyro {
             let rate = (travel.yaw_rate_is_new == 1).then_some(travel.yaw_rate);
             self.gyro.advance(travel.header.stamp, rate);
         }
@@ -265,14 +325,18 @@ impl Estimator {
 
     /// Brings what the wheels have rolled into the pose, if all that the model needs is there.
     fn roll(&mut self, travel: &Travel) {
-        if !self.wheels.ready() {
-            return;
-        }
         let stamp = travel.header.stamp;
         let since = elapsed(stamp, self.rolled);
+        if !self.wheels.ready() && !self.goes_without(stamp) {
+            return;
+        }
         if self.gap_pending && self.wheels.beyond_belief(since, GAP_SLACK, GAP_MARGIN) {
             self.lose();
             self.applied(stamp, 0.0, 0.0);
+            return;
+        }
+        if self.fused.is_some() {
+            self.fuse(travel);
             return;
         }
         let aids = Aids { steering: self.steering, gyro: &self.gyro };
@@ -295,6 +359,7 @@ impl Estimator {
 
     fn applied(&mut self, stamp: Nanos, distance: f64, turn: f64) {
         self.wheels.apply();
+        self.awaiting = None;
         self.rolled = stamp;
         self.twist.push(stamp, distance, turn);
     }
@@ -334,12 +399,10 @@ impl Estimator {
         let rest = Rest { standstill: self.standstill(now), moved: self.moved.unwrap_or(now) };
         match fixes::judge(&fix, now, &rest, self.settings.fix_age) {
             Ruling::Wait => self.waiting = Some(fix),
-            Ruling::Said(verdict) => {
+            Ruling::Said(ruled) => {
                 self.waiting = None;
+                let verdict = self.corrected(&fix, ruled);
                 (self.verdict, self.fix_sequence) = (verdict, fix.header.sequence);
-                if verdict == FixVerdict::Accepted {
-                    self.accept(&fix);
-                }
             }
         }
     }
@@ -352,55 +415,6 @@ impl Estimator {
         self.jump(estimate, EstimatorState::Valid, ResetReason::Fix);
         self.wheels.apply();
         self.restorable = false;
-    }
-
-    /// The covariance to publish: while a wheel is awaited, with what the others say has been
-    /// rolled.
-    fn published_covariance(&self) -> Matrix3<f64> {
-        let awaiting = self.wheels.awaiting();
-        if awaiting == 0.0 {
-            return self.estimate.covariance;
-        }
-        let yaw = self.curvature * awaiting;
-        let unknown = Vector3::new(awaiting, awaiting, yaw).map(|deviation| deviation * deviation);
-        self.estimate.covariance + Matrix3::from_diagonal(&unknown)
-    }
-
-    fn write(&self, travel: &Travel, gap: bool, out: &mut Odometry) {
-        let stamp = travel.header.stamp;
-        let standstill = self.standstill(stamp);
-        let (speed, yaw_rate) = if standstill { (0.0, 0.0) } else { self.twist.at(stamp) };
-        let record = self.front.as_ref().map(|front| *front.record()).unwrap_or_default();
-        let mut covariance = [0.0; 9];
-        covariance.copy_from_slice(self.published_covariance().as_slice());
-        *out = Odometry {
-            header: Header { stamp, origin: travel.header.origin, ..out.header },
-            x: self.estimate.pose.x,
-            y: self.estimate.pose.y,
-            yaw: self.estimate.pose.yaw,
-            speed,
-            yaw_rate,
-            steering: self.steering.unwrap_or(0.0),
-            covariance,
-            innovation: record.innovation,
-            test_ratio: record.test_ratio,
-            distance: self.distance,
-            travel: self.wheels.applied(),
-            counter_epoch: travel.counter_epoch,
-            resets: self.resets,
-            corrections: record.corrections,
-            gated: record.gated,
-            unusable: self.unusable,
-            state: self.state.code(),
-            model: self.model.kind().code(),
-            reset_reason: self.reason.code(),
-            fix_verdict: self.verdict.code(),
-            standstill: u8::from(standstill),
-            corrected: u8::from(record.corrected),
-            gap: u8::from(gap),
-            fix_sequence: self.fix_sequence,
-            ..Odometry::default()
-        };
     }
 }
 
