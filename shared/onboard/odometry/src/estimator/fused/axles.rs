@@ -23,6 +23,15 @@ const THRESHOLD: f64 = 23.0;
 const CONTRADICTION: f64 = 3.0;
 const MARGIN: f64 = 2.0;
 
+/// A counter is dead where all others went on by so many counts, and its wheel should have rolled
+/// this share of the virtual centre wheel's way.
+const COUNTS: f64 = 25.0;
+const LEAST_WAY: f64 = 0.4;
+
+/// Without a steering sensor the front axle alone tells the heading for this share of the wheelbase
+/// at most.
+pub(crate) const BLIND: f64 = 0.5;
+
 /// An axle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Axle {
@@ -55,6 +64,7 @@ pub(crate) struct Slip {
 /// distance times tan(phi) / L.
 pub(crate) fn sums(before: &AxleSums, state: &State, record: &Record) -> AxleSums {
     let mut sums = *before;
+    (0..4).for_each(|wheel| sums.counted[wheel] += record.travel[wheel].abs());
     let measures = state.measures();
     let centre = state.centre(record);
     if record.gap.is_some()
@@ -98,6 +108,26 @@ pub(crate) fn sums(before: &AxleSums, state: &State, record: &Record) -> AxleSum
 /// Distance and turn of an axle whose left wheel is at `lateral`.
 fn mean_and_turn(left: f64, right: f64, lateral: f64) -> (f64, f64) {
     (0.5 * (left + right), (right - left) / (2.0 * lateral))
+}
+
+/// The wheel whose counter stood still between two sums while all others went on, none where the
+/// vehicle may have turned about it.
+pub(crate) fn dead(
+    state: &State,
+    record: &Record,
+    then: &AxleSums,
+    setup: &Setup,
+) -> Option<usize> {
+    let counted = |wheel: usize| record.axles.counted[wheel] - then.counted[wheel];
+    let (measures, centre) = (state.measures(), state.centre(record));
+    (0..4).find(|&dead| {
+        let mut others = (0..4).filter(|wheel| *wheel != dead);
+        let least = COUNTS * setup.coarsest;
+        let way =
+            if dead < 2 { measures.front(dead, centre).1 } else { measures.rear(dead, centre) };
+        let alone = others.all(|wheel| counted(wheel) > least);
+        record.read == [true; 4] && counted(dead) == 0.0 && alone && way > LEAST_WAY
+    })
 }
 
 /// The axle that slipped between two sums, if one did.

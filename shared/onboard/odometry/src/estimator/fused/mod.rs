@@ -97,6 +97,8 @@ pub(crate) struct Fused {
     /// Number of the record after which the window begins.
     window: Option<u64>,
     slipping: Option<Axle>,
+    /// Way at which it began to \[m\].
+    slipped: f64,
     distrusted: [bool; 4],
     read: [bool; 4],
     statistics: Statistics,
@@ -113,6 +115,7 @@ impl Fused {
             sums: AxleSums::default(),
             window: None,
             slipping: None,
+            slipped: 0.0,
             distrusted: [false; 4],
             read: [false; 4],
             statistics: Statistics::default(),
@@ -261,11 +264,17 @@ impl Fused {
         }
         self.window = Some(window);
         let then = self.history.record(window)?.axles;
+        if let Some(wheel) = axles::dead(&self.state, &now, &then, &self.setup) {
+            self.slipping = None;
+            return self.give_up(wheel, window);
+        }
         let found = axles::slipping(&self.setup, &self.state, &then, &now.axles);
         let begins = self.slipping.is_none();
+        let blind = self.blind(&now, begins);
         let before = self.slipping;
         // An axle that was named without evidence gives way to one that is named with it.
         self.slipping = found.map(|slip| match before {
+            Some(_) if blind => Axle::Front,
             Some(axle) if !slip.evident => axle,
             _ => slip.axle,
         });
@@ -273,6 +282,26 @@ impl Fused {
         self.statistics.gated = self.statistics.gated.wrapping_add(u32::from(begins));
         self.history.slip(window, axle);
         Some(window)
+    }
+
+    /// Leaves out a wheel whose counter stands still, from the window's beginning on.
+    fn give_up(&mut self, wheel: usize, window: u64) -> Option<u64> {
+        let known = std::mem::replace(&mut self.distrusted[wheel], true);
+        if known {
+            return None;
+        }
+        self.statistics.gated = self.statistics.gated.wrapping_add(1);
+        self.history.exclude(window, core::array::from_fn(|index| index == wheel));
+        Some(window)
+    }
+
+    /// Whether the rear axle has been left out for longer than the front alone tells the heading.
+    fn blind(&mut self, now: &Record, begins: bool) -> bool {
+        if begins {
+            self.slipped = now.axles.way;
+        }
+        let way = now.axles.way - self.slipped;
+        !self.setup.steered && way > axles::BLIND * self.setup.wheelbase
     }
 
     /// What a block's end means for the wheels, and whether it is to be gone through again.

@@ -76,6 +76,8 @@ pub(crate) struct AxleSums {
     pub(crate) rolled: [f64; 2],
     /// Way across the body that the front wheels' directions have, squared, times way \[m\].
     pub(crate) across: f64,
+    /// Way of each wheel's counter \[m\].
+    pub(crate) counted: [f64; 4],
     /// Records in which not both axles told.
     pub(crate) lacking: u32,
 }

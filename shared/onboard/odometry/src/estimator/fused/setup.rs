@@ -42,6 +42,8 @@ pub(crate) struct Setup {
     /// Variance of the steering angle \[rad^2\].
     pub(crate) steering_variance: f64,
     pub(crate) steered: bool,
+    /// The coarsest count \[m\].
+    pub(crate) coarsest: f64,
     /// Wheels that report.
     pub(crate) wheels: [bool; 4],
     /// Length of a block \[m\].
@@ -81,6 +83,7 @@ impl Setup {
             wheel_variance: noise.map(|noise| (noise * noise).max(LEAST_VARIANCE)),
             quantisation: scales.map(|scale| scale.metres_per_count.powi(2) / 6.0),
             steering_variance: (steering * steering).max(LEAST_VARIANCE),
+            coarsest,
             steered: sensors.steering,
             wheels: sensors.wheels,
             block: (BLOCK * vehicle.wheelbase).max(COUNTS * coarsest),
