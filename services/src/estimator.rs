@@ -3,11 +3,11 @@
 //! Topics in: `travel`, every one in order; `fix`; `restore`. Topics out: `odometry`, one per travel.
 
 use kerbside_messages::{Fix, Odometry, Restore, Travel};
-use kerbside_odometry::{Estimator, EstimatorInputs};
+use kerbside_odometry::EstimatorInputs;
 use kerbside_runtime::Newest;
 
 use crate::exit::{Exit, Failure};
-use crate::ingest::{WAIT, no_model};
+use crate::ingest::WAIT;
 use crate::life::{Life, Service};
 
 /// Runs the estimator.
@@ -15,9 +15,7 @@ use crate::life::{Life, Service};
 /// # Errors
 /// [`Failure`] where the process cannot take part, or the vehicle has nothing to compute motion from.
 pub fn run(service: &Service) -> Result<Exit, Failure> {
-    let mut stage =
-        Estimator::with_sensors(&service.vehicle, &service.sensors, &service.stack.estimator)
-            .map_err(no_model)?;
+    let mut stage = service.estimator()?;
     let mut life = Life::join(service, 1)?;
     let mut travel = life.subscriber::<Travel>(512)?;
     let mut fixes = life.subscriber::<Fix>(16)?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use kerbside_geometry::{Pose, Vehicle};
 use kerbside_messages::Process;
-use kerbside_odometry::{InitialPose, Sensors};
+use kerbside_odometry::{Estimator, InitialPose, Sensors};
 use kerbside_runtime::Instance;
 use kerbside_safety::SafetySettings;
 use kerbside_settings::{InterfaceSettings, Problem, Stack, Start};
@@ -121,6 +121,16 @@ impl Service {
         }
         let args = args.clone();
         Ok(Self { process, instance, stack, stack_text, vehicle, sensors, warnings, args })
+    }
+
+    /// The estimator of this vehicle, with what is known of it.
+    ///
+    /// # Errors
+    /// [`Failure`] where the vehicle has nothing to compute motion from.
+    pub fn estimator(&self) -> Result<Estimator, Failure> {
+        let (settings, prior) = (&self.stack.estimator, self.stack.prior());
+        Estimator::with_prior(&self.vehicle, &self.sensors, settings, &prior)
+            .map_err(crate::ingest::no_model)
     }
 
     /// Whether the instance is fed from recorded readings.

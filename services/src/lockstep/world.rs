@@ -183,19 +183,13 @@ impl World {
 
     fn check_models(&self) -> Result<(), Failure> {
         self.ingest()?;
-        self.estimator()?;
+        self.service.estimator()?;
         Ok(())
     }
 
     fn ingest(&self) -> Result<Ingest, Failure> {
         let service = &self.service;
         Ingest::with_sensors(&service.vehicle, &service.sensors, &service.stack.ingest)
-            .map_err(crate::ingest::no_model)
-    }
-
-    fn estimator(&self) -> Result<Estimator, Failure> {
-        let service = &self.service;
-        Estimator::with_sensors(&service.vehicle, &service.sensors, &service.stack.estimator)
             .map_err(crate::ingest::no_model)
     }
 

@@ -38,8 +38,7 @@ impl Chain {
             travels: Admission::default(),
             travel: Travel::default(),
             travel_sequence: 0,
-            estimator: Estimator::with_sensors(vehicle, sensors, &stack.estimator)
-                .map_err(no_model)?,
+            estimator: service.estimator()?,
             odometries: Admission::default(),
             odometry: Odometry::default(),
             odometry_sequence: 0,

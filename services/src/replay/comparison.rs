@@ -96,7 +96,7 @@ impl Comparison {
             return notes;
         };
         let model = OdometryModel::from_code(newest.model).unwrap_or(OdometryModel::None);
-        notes.extend(sensing::lacks(model, &input.sensors));
+        notes.extend(sensing::lacks(model, super::report::filter_of(track), &input.sensors));
         notes.extend(caution(track));
         match track.gaps.len() {
             0 => {}

@@ -1,12 +1,13 @@
 //! The report of a replay: from what was computed to what is drawn.
 
 use kerbside_geometry::{Pose, WHEELS};
-use kerbside_messages::OdometryModel;
+use kerbside_messages::{FilterKind, OdometryModel};
 use kerbside_reports::{
     Drift, Gap, Model, Motion, Provenance, RefusalCount, ReplayReport, WheelTravel,
 };
 
 use super::comparison::{Comparison, caution, time_of};
+use super::track::Track;
 use super::{Finished, sensing};
 
 /// The report of `one`.
@@ -50,12 +51,18 @@ pub fn model_of(one: &Finished) -> OdometryModel {
     OdometryModel::from_code(code).unwrap_or(OdometryModel::None)
 }
 
+/// The filter that the odometry says it was computed by.
+pub fn filter_of(track: &Track) -> FilterKind {
+    let code = track.newest.map_or(0, |odometry| odometry.filter);
+    FilterKind::from_code(code).unwrap_or(FilterKind::Rear)
+}
+
 fn model(one: &Finished) -> Model {
-    let (model, sensors) = (model_of(one), &one.job.input.sensors);
+    let (model, filter, sensors) = (model_of(one), filter_of(&one.track), &one.job.input.sensors);
     Model {
         name: model.name().to_owned(),
-        uses: sensing::uses(model, sensors),
-        missing: sensing::lacks(model, sensors),
+        uses: sensing::uses(model, filter, sensors),
+        missing: sensing::lacks(model, filter, sensors),
     }
 }
 

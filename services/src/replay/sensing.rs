@@ -2,7 +2,7 @@
 //! file describes it and the drive has it. Nothing is guessed.
 
 use kerbside_geometry::{Vehicle, WHEELS, Wheel};
-use kerbside_messages::{OdometryModel, Raw};
+use kerbside_messages::{FilterKind, OdometryModel, Raw};
 use kerbside_odometry::{Sensors, WheelSignal};
 
 /// What some readings carry.
@@ -124,8 +124,8 @@ pub fn parse(text: &str) -> Result<Sensors, String> {
     Ok(sensors)
 }
 
-/// What a model uses, by name.
-pub fn uses(model: OdometryModel, sensors: &Sensors) -> Vec<String> {
+/// What a filter of a model uses, by name: the fused one takes every sensor that is there.
+pub fn uses(model: OdometryModel, filter: FilterKind, sensors: &Sensors) -> Vec<String> {
     let signal = match sensors.signal {
         WheelSignal::Counts => "counts of",
         WheelSignal::Speeds => "speed of",
@@ -137,6 +137,13 @@ pub fn uses(model: OdometryModel, sensors: &Sensors) -> Vec<String> {
         let rear = rear.into_iter().find(|wheel| sensors.wheels[wheel.index()]);
         rear.map_or_else(one, Wheel::name)
     };
+    let fused = filter == FilterKind::Fused && model != OdometryModel::None;
+    if fused {
+        let mut used = vec![format!("{signal} {}", names(sensors.wheels).unwrap_or_default())];
+        used.extend(sensors.steering.then(|| "steering sensor".to_owned()));
+        used.extend(sensors.gyro.then(|| "gyro".to_owned()));
+        return used;
+    }
     let wheels = match model {
         OdometryModel::RearFront => "rl, rr, fl, fr",
         OdometryModel::Rear => "rl, rr",
@@ -155,9 +162,14 @@ pub fn uses(model: OdometryModel, sensors: &Sensors) -> Vec<String> {
     used
 }
 
-/// What the vehicle or the drive lacks, and what follows from that for the model.
-pub fn lacks(model: OdometryModel, sensors: &Sensors) -> Vec<String> {
+/// What the vehicle or the drive lacks, and what follows from that for a filter of the model.
+pub fn lacks(model: OdometryModel, filter: FilterKind, sensors: &Sensors) -> Vec<String> {
     let [fl, fr, rl, rr] = sensors.wheels;
+    let beside = fl || fr || sensors.steering || sensors.gyro;
+    if filter == FilterKind::Fused && model == OdometryModel::Rear && beside {
+        // The front wheels that are there, or the gyro, see the heading too.
+        return Vec::new();
+    }
     let rear = match (rl, rr) {
         (true, true) => "the rear wheels are on one place",
         (false, false) => "no rear wheel is read",
@@ -220,6 +232,17 @@ mod tests {
         let speeds = Carried::by(&[raw(0, 0b1100)]).sensors(&vehicle);
         assert_eq!(speeds.model(&vehicle), Ok(OdometryModel::Rear));
         assert_eq!(speeds.signal, WheelSignal::Speeds);
+    }
+
+    #[test]
+    fn the_fused_filter_uses_whatever_is_there() {
+        let sensors = Carried::by(&[raw(0b1111, 0)]).sensors(&car());
+        let of = |filter| {
+            let model = OdometryModel::Rear;
+            (uses(model, filter, &sensors), lacks(model, filter, &sensors).len())
+        };
+        assert_eq!(of(FilterKind::Fused), (vec!["counts of fl, fr, rl, rr".to_owned()], 0));
+        assert_eq!(of(FilterKind::Rear), (vec!["counts of rl, rr".to_owned()], 1));
     }
 
     #[test]

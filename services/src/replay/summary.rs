@@ -7,7 +7,7 @@ use kerbside_geometry::angle;
 use kerbside_messages::EstimatorState;
 use serde_json::{Map, Value, json};
 
-use super::report::model_of;
+use super::report::{filter_of, model_of};
 use super::{Finished, Outcome, ReplayArgs, sensing};
 use crate::exit::{Exit, Failure};
 use crate::tables;
@@ -125,7 +125,8 @@ fn print_one(one: &Finished) {
     let mut row = |name: &str, value: String| {
         table.add_row([Cell::new(name), Cell::new(value)]);
     };
-    let uses = sensing::uses(model_of(one), &one.job.input.sensors).join(", ");
+    let filter = filter_of(&one.track);
+    let uses = sensing::uses(model_of(one), filter, &one.job.input.sensors).join(", ");
     row("odometry model", format!("{} ({uses})", model_of(one)));
     row("distance", format!("{:.2} m in {:.1} s", one.track.distance(), one.duration));
     row("readings", format!("{}, {} gaps", one.job.input.raws.len(), one.track.gaps.len()));

@@ -88,7 +88,7 @@ impl World {
                 self.channels.travel.restart(now);
             }
             Process::Estimator => {
-                self.stages.estimator = self.estimator().ok();
+                self.stages.estimator = self.service.estimator().ok();
                 self.channels.odometry.restart(now);
             }
             Process::Tracker => {

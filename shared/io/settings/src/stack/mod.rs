@@ -4,6 +4,7 @@ mod bounds;
 mod defaults;
 mod keys;
 mod load;
+mod prior;
 
 use std::path::PathBuf;
 
