@@ -309,6 +309,25 @@ fn what_runs_do_not_tell_is_named_with_the_manoeuvre_that_would() {
     let missing = json["missing"].as_array().unwrap();
     let of = missing.iter().find(|missing| missing["parameter"] == "track_rear").unwrap();
     assert!(of["manoeuvre"].as_str().unwrap().contains("circles"), "{of}");
+    // What is not identified stays as it was, and is not said to be calibrated.
+    let file = load_vehicle(&case.path("out/vehicle.toml")).unwrap().value;
+    assert_eq!((file.vehicle.track_rear, file.vehicle.wheelbase), (0.31, 0.51));
+    assert!(file.vehicle.radius[2] < 0.07);
+    let calibrated = file.calibration.unwrap().parameters;
+    assert!(!calibrated.contains(&"track_rear".to_owned()), "{calibrated:?}");
+}
+
+#[test]
+fn the_gain_is_found_where_it_is_asked_for() {
+    let case = Case::new(Known::Reference, |_| {});
+    let json = case.calibrated(&["--free-gain"]);
+    holds_the_truth(&json, 3.0);
+    let gain = &json["parameters"]["steering_sensor.gain"];
+    let number = |key: &str| gain[key].as_f64().unwrap();
+    assert!((number("value") - 1.0).abs() < 3.0 * number("deviation"), "{gain}");
+    let sensor =
+        load_vehicle(&case.path("out/vehicle.toml")).unwrap().value.vehicle.steering_sensor;
+    assert!((sensor.unwrap().gain - number("value")).abs() < 1e-4, "{sensor:?}");
 }
 
 /// A wheel that counts backwards.

@@ -3,7 +3,7 @@
 use kerbside_calibration::{
     COUNT, Calibrated, CalibrationError, ClosedForm, Derived, Finding, LeftOut, PARAMETERS,
     Parameter, Parameters, Rejected, Run, RunResiduals, Settings, Square, SteeringCheck, calibrate,
-    check_steering, closed_form, diagnose_runs, fold_of,
+    check_steering, closed_form, diagnose_runs, fold_of, information,
 };
 use kerbside_geometry::Vehicle;
 use kerbside_settings::CALIBRATED;
@@ -251,12 +251,20 @@ fn refusal(
     settings: &Settings,
 ) -> Failure {
     let findings = diagnose_runs(runs, vehicle, &settings.noise);
-    let mut lines = vec![error.to_string()];
-    for run in runs {
+    let nominal = Parameters::nominal(vehicle);
+    let why = |run: &Run| {
         let against = forbidding(&findings, &run.name);
         if !against.is_empty() {
-            lines.push(format!("run {}: {}", run.name, against.join("; ")));
+            return Some(format!("run {}: {}", run.name, against.join("; ")));
         }
-    }
-    Failure::new(Exit::Data, lines.join("\n"))
+        let alone = core::slice::from_ref(run);
+        information(alone, vehicle, &nominal, settings).err().map(|error| error.to_string())
+    };
+    let reasons: Vec<String> = runs.iter().filter_map(why).collect();
+    let told = if reasons.len() == runs.len() {
+        format!("no run can be used:\n{}", reasons.join("\n"))
+    } else {
+        core::iter::once(error.to_string()).chain(reasons).collect::<Vec<_>>().join("\n")
+    };
+    Failure::new(Exit::Data, told)
 }
