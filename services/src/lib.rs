@@ -5,6 +5,7 @@
 
 pub mod actuation;
 pub mod bench;
+pub mod calibrate;
 pub mod children;
 pub mod commands;
 pub mod configuration;

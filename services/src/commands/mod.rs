@@ -12,6 +12,7 @@ use clap::{Parser, Subcommand};
 use kerbside_messages::Process;
 use kerbside_runtime::Instance;
 
+use crate::calibrate::CalibrateArgs;
 use crate::exit::{Exit, Failure};
 use crate::park::ParkArgs;
 use crate::replay::ReplayArgs;
@@ -69,6 +70,9 @@ enum Verb {
     /// Feed recorded readings through ingest and estimator, and say how far the odometry drifts.
     #[command(after_help = "Example: kerbside replay tests/data/cases/paper-1-6 --speed 10")]
     Replay(ReplayArgs),
+    /// Identify radii, tracks, wheelbase and steering offset from recorded runs, and write them down.
+    #[command(after_help = "Example: kerbside calibrate CASE --leave-out straight-5,circle-5")]
+    Calibrate(CalibrateArgs),
     /// Check, show or explain the configuration.
     #[command(subcommand, after_help = "Example: kerbside config check")]
     Config(config::ConfigVerb),
@@ -131,6 +135,10 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             let level = level.unwrap_or("warn");
             logging::start("replay", level, false);
             crate::replay::run(&ReplayArgs { log: Some(level.to_owned()), ..args.clone() })
+        }
+        Verb::Calibrate(args) => {
+            logging::start("calibrate", level.unwrap_or("warn"), false);
+            crate::calibrate::run(args)
         }
         Verb::Up(args) => up::run(args, level),
         Verb::Service(verb) => serve(verb, level),

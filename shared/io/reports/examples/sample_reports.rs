@@ -16,6 +16,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("not-numbers.html", samples::not_numbers().render()?),
         ("replayed.html", samples::replayed().render()?),
         ("refused.html", samples::refused().render()?),
+        ("calibrated.html", samples::calibrated().render()?),
+        ("not-calibrated.html", samples::uncalibrated().render()?),
         ("parked.svg", samples::parked().picture()),
     ];
     for (name, text) in files {

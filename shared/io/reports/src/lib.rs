@@ -9,11 +9,12 @@
 //! - [`svg`]: figures. A [`svg::Map`] in metres with equal scales, a [`svg::Chart`] of traces over
 //!   a common axis, [`svg::latency_histogram`] and [`svg::latency_tail`] on logarithmic axes.
 //! - [`page`]: what a page is made of: a verdict, sections, key figures, tables, facts, figures.
-//! - [`ParkReport`] and [`ReplayReport`]: plain data in, a page out.
+//! - [`ParkReport`], [`ReplayReport`] and [`CalibrateReport`]: plain data in, a page out.
 //!
 //! Lengths are metres, angles radians, times seconds since the run's start, unless a name says
 //! else. Figures that are not finite are shown as a dash; they never reach the drawing.
 
+mod calibrate;
 mod error;
 pub mod format;
 pub mod page;
@@ -23,6 +24,10 @@ mod replay;
 pub mod svg;
 mod track;
 
+pub use calibrate::{
+    CalibrateReport, CalibratedParameter, DerivedFigure, EndErrors, ReckonedPath, RunNote,
+    RunPaths, RunResidual,
+};
 pub use error::ReportError;
 pub use park::{
     CommandSample, EstimateSample, Event, EventKind, Figures, JudgedOn, Latency, Outcome,

@@ -14,6 +14,8 @@ fn pages() -> Vec<(&'static str, String)> {
         ("not numbers", samples::not_numbers().render().unwrap()),
         ("replayed", samples::replayed().render().unwrap()),
         ("refused", samples::refused().render().unwrap()),
+        ("calibrated", samples::calibrated().render().unwrap()),
+        ("not calibrated", samples::uncalibrated().render().unwrap()),
     ]
 }
 
@@ -244,6 +246,27 @@ fn a_parked_page_says_what_it_must() {
     ] {
         assert!(page.contains(word), "{word:?} is missing");
     }
+}
+
+#[test]
+fn a_calibration_page_says_what_it_must() {
+    let page = samples::calibrated().render().unwrap();
+    for word in [
+        "Calibrated.",
+        "1 parameter is not identified",
+        "217.3\u{202f}mm before",
+        "0.28400 to 0.28600",
+        "no, kept as it was",
+        "left-0, before",
+        "left-2 (rejected, does not count)",
+        "full circles of 1.5 m radius to both sides",
+        "epsilon rear",
+        "kerbside calibrate cases/car",
+    ] {
+        assert!(page.contains(word), "{word:?} is missing");
+    }
+    let page = samples::uncalibrated().render().unwrap();
+    assert!(page.contains("Not good.") && page.contains("These runs identify nothing."), "{page}");
 }
 
 #[test]

@@ -42,4 +42,4 @@ pub use stack::{
     REAL_TIME_TIMEOUTS, RealtimeMode, RealtimeSettings, RecorderSettings, Stack, Start,
     scaled_tracker,
 };
-pub use vehicle::{EFFECTS, Uncertainty, VehicleFile};
+pub use vehicle::{CALIBRATED, Calibration, EFFECTS, Uncertainty, VehicleFile};

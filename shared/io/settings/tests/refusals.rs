@@ -458,3 +458,63 @@ fn checking_everything_lists_each_problem_of_each_file() {
     }
     assert_eq!(found.len(), 7, "{found:?}");
 }
+
+const CALIBRATED_TEXT: &str = r#"
+[calibration]
+method = "joint"
+version = "0.1.0"
+date = "2026-11-28"
+runs = ["straight-1", "circle-1"]
+parameters = ["track_rear", "steering_sensor.offset"]
+covariance = [[4e-6, 1e-9], [1e-9, 1e-8]]
+[calibration.residuals]
+inflation = 1.2
+[calibration.rejected]
+circle-2 = "slip"
+"#;
+
+fn calibrated_text(from: &str, to: &str) -> String {
+    assert!(CALIBRATED_TEXT.contains(from), "no {from}");
+    format!("{}{}", vehicle_text(), CALIBRATED_TEXT.replacen(from, to, 1))
+}
+
+#[test]
+fn a_calibration_is_read_and_shown_as_it_was() {
+    let loaded = parse_vehicle("car.toml", &calibrated_text("", "")).unwrap();
+    let again = parse_vehicle("car.toml", &loaded.show()).unwrap();
+    let calibration = loaded.value.calibration.unwrap();
+    assert_eq!(calibration.covariance_of("track_rear", "steering_sensor.offset"), Some(1e-9));
+    assert_eq!(calibration.covariance_of("track_rear", "wheelbase"), None);
+    assert_eq!(again.value.calibration, Some(calibration));
+    assert_eq!(parse_vehicle("car.toml", vehicle_text()).unwrap().value.calibration, None);
+}
+
+#[test]
+fn a_calibration_that_cannot_be_is_refused() {
+    for (from, to, words) in [
+        ("1e-9], [1e-9", "1e-9], [2e-9", "calibration.covariance"),
+        ("[4e-6", "[-4e-6", "calibration.covariance"),
+        ("1e-9], [1e-9", "1e-3], [1e-3", "calibration.covariance"),
+        (", [1e-9, 1e-8]]", "]", "2 rows of 2 entries"),
+        ("\"track_rear\"", "\"track_raer\"", "calibration.parameters[0]"),
+        ("\"joint\"", "\"guess\"", "closed-form"),
+        ("date = ", "day = ", "calibration.day"),
+    ] {
+        let error = parse_vehicle("car.toml", &calibrated_text(from, to)).unwrap_err();
+        assert!(error.to_string().contains(words), "{to}: {error}");
+    }
+}
+
+#[test]
+fn a_steering_sensor_has_offset_and_gain() {
+    let noise = vehicle_text().lines().skip_while(|line| *line != "[steering_sensor]").nth(1);
+    let noise = noise.unwrap();
+    let with = |more: &str| vehicle_text().replacen(noise, &format!("{noise}\n{more}"), 1);
+    let sensor =
+        |text: &str| parse_vehicle("car.toml", text).unwrap().value.vehicle.steering_sensor;
+    assert_eq!(sensor(vehicle_text()).map(|s| (s.offset, s.gain)), Some((0.0, 1.0)));
+    let text = with("offset = -0.01\ngain = 1.05");
+    assert_eq!(sensor(&text).map(|s| (s.offset, s.gain)), Some((-0.01, 1.05)));
+    let error = parse_vehicle("car.toml", &with("gain = 0.0")).unwrap_err();
+    assert!(error.to_string().contains("steering_sensor.gain = 0.0: out of range"), "{error}");
+}

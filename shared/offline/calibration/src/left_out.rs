@@ -78,10 +78,29 @@ pub(crate) fn left_out(
     Ok(table)
 }
 
-/// The part each run belongs to: the runs of every manoeuvre are dealt out in turn.
-fn fold_of(manoeuvres: &[String], folds: usize) -> Vec<usize> {
-    let before = |index: usize| {
-        manoeuvres[..index].iter().filter(|other| **other == manoeuvres[index]).count()
-    };
-    (0..manoeuvres.len()).map(|index| before(index) % folds).collect()
+/// The part each run belongs to: run after run, those of one manoeuvre after one another, are dealt out in turn, so
+/// that parts are as large as one another and hold something of every manoeuvre there is enough of.
+#[must_use]
+pub fn fold_of(manoeuvres: &[String], folds: usize) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..manoeuvres.len()).collect();
+    order.sort_by_key(|index| &manoeuvres[*index]);
+    let mut fold = vec![0; order.len()];
+    for (place, index) in order.into_iter().enumerate() {
+        fold[index] = place % folds.max(1);
+    }
+    fold
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fold_of;
+
+    #[test]
+    fn parts_are_even_whatever_is_driven() {
+        let named = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+        assert_eq!(fold_of(&named(&["straight", "eight", "slalom", "steps"]), 3), [0, 0, 1, 2]);
+        let both = named(&["circle", "straight", "circle", "straight"]);
+        assert_eq!(fold_of(&both, 2), [0, 0, 1, 1], "of either manoeuvre one each");
+        assert_eq!(fold_of(&[], 0), [0; 0]);
+    }
 }

@@ -49,7 +49,7 @@ pub use diagnose::{Finding, Problem, diagnose_runs};
 pub use error::CalibrationError;
 pub use information::{Information, information};
 pub use joint::{Rejected, RunResiduals};
-pub use left_out::LeftOut;
+pub use left_out::{LeftOut, fold_of};
 pub use missing::Missing;
 pub use noise::{Noise, Settings};
 pub use parameters::{COUNT, PARAMETERS, Parameter, Parameters, Vector};

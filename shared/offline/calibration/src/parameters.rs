@@ -1,6 +1,6 @@
 //! What is identified: radii, tracks, wheelbase, and the steering sensor's zero and gain.
 
-use kerbside_geometry::{Vehicle, WHEELS, Wheel};
+use kerbside_geometry::{SteeringSensor, Vehicle, WHEELS, Wheel};
 use nalgebra::SVector;
 
 /// How many parameters there are.
@@ -93,12 +93,14 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// What the vehicle's file says; a steering sensor is believed to have zero 0 and gain 1.
+    /// What the vehicle's file says; without a steering sensor zero 0 and gain 1.
     #[must_use]
     pub fn nominal(vehicle: &Vehicle) -> Self {
         let [fl, fr, rl, rr] = vehicle.radius;
         let (front, rear) = (vehicle.track_front, vehicle.track_rear);
-        Self { values: Vector::from([fl, fr, rl, rr, front, rear, vehicle.wheelbase, 0.0, 1.0]) }
+        let (zero, gain) =
+            vehicle.steering_sensor.map_or((0.0, 1.0), |sensor| (sensor.offset, sensor.gain));
+        Self { values: Vector::from([fl, fr, rl, rr, front, rear, vehicle.wheelbase, zero, gain]) }
     }
 
     /// The value of one parameter, in its unit.
@@ -125,7 +127,7 @@ impl Parameters {
         self.values[left] - self.values[left + 1]
     }
 
-    /// `vehicle` with radii, tracks and wheelbase replaced by these.
+    /// `vehicle` with radii, tracks, wheelbase and the steering sensor's offset and gain replaced by these.
     #[must_use]
     pub fn applied(&self, vehicle: &Vehicle) -> Vehicle {
         Vehicle {
@@ -133,6 +135,11 @@ impl Parameters {
             track_front: self.get(Parameter::TrackFront),
             track_rear: self.get(Parameter::TrackRear),
             wheelbase: self.get(Parameter::Wheelbase),
+            steering_sensor: vehicle.steering_sensor.map(|sensor| SteeringSensor {
+                offset: self.get(Parameter::SteeringZero),
+                gain: self.get(Parameter::SteeringGain),
+                ..sensor
+            }),
             ..vehicle.clone()
         }
     }

@@ -52,10 +52,9 @@ impl Chassis {
                 noise_per_distance: driven.map(|wheel| encoders.noise[wheel.index()]),
                 rate: encoders.rate,
             }),
-            steering_sensor: sensors.steering.map(|sensor| kerbside_geometry::SteeringSensor {
-                noise: sensor.white,
-                rate: sensor.rate,
-            }),
+            steering_sensor: sensors
+                .steering
+                .map(|sensor| kerbside_geometry::SteeringSensor::new(sensor.white, sensor.rate)),
             gyro: sensors
                 .gyro
                 .map(|gyro| kerbside_geometry::Gyro { noise: gyro.white, rate: gyro.rate }),

@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use kerbside_geometry::{Vehicle, WHEELS};
+use kerbside_geometry::{SteeringSensor, Vehicle, WHEELS};
 
 use crate::body::Body;
 use crate::ground::Motion;
@@ -37,7 +37,7 @@ pub(crate) struct Sensing {
     counter_bits: u32,
     first_counts: [i64; 4],
     phase: [f64; 4],
-    has_steering: bool,
+    steering: Option<SteeringSensor>,
     has_gyro: bool,
     noise: Noise,
     normal: Normal,
@@ -61,7 +61,7 @@ impl Sensing {
             counter_bits: vehicle.encoders.map_or(64, |encoders| encoders.counter_bits),
             first_counts: [0; 4],
             phase: core::array::from_fn(|_| noise.phase * normal.uniform()),
-            has_steering: vehicle.steering_sensor.is_some(),
+            steering: vehicle.steering_sensor,
             has_gyro: vehicle.gyro.is_some(),
             noise: *noise,
             normal,
@@ -132,7 +132,8 @@ impl Sensing {
     }
 
     fn angle(&mut self, rack: f64) -> Option<f64> {
-        self.has_steering.then(|| rack + white(&mut self.normal, self.noise.steering))
+        let sensor = self.steering?;
+        Some(sensor.reading(rack) + white(&mut self.normal, self.noise.steering))
     }
 
     fn rate(&mut self, yaw_rate: f64) -> Option<f64> {

@@ -38,7 +38,7 @@ impl Vehicle {
                 noise_per_distance: Some(0.0005),
                 rate: 200.0,
             }),
-            steering_sensor: Some(SteeringSensor { noise: 0.0035, rate: 200.0 }),
+            steering_sensor: Some(SteeringSensor::new(0.0035, 200.0)),
             gyro: None,
             reference: Some(Reference {
                 position_noise: 0.002,

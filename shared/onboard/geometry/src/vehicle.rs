@@ -117,6 +117,30 @@ pub struct SteeringSensor {
     pub noise: f64,
     /// Readings per second \[Hz\].
     pub rate: f64,
+    /// What it reads while the wheels stand straight \[rad\].
+    pub offset: f64,
+    /// Reading per road-wheel angle, beyond the offset \[-\].
+    pub gain: f64,
+}
+
+impl SteeringSensor {
+    /// A sensor without offset, whose reading is the angle: `noise` \[rad\] at `rate` \[Hz\].
+    #[must_use]
+    pub const fn new(noise: f64, rate: f64) -> Self {
+        Self { noise, rate, offset: 0.0, gain: 1.0 }
+    }
+
+    /// Road-wheel angle of the equivalent centre wheel for a reading, both \[rad\].
+    #[must_use]
+    pub fn angle(&self, reading: f64) -> f64 {
+        (reading - self.offset) / self.gain
+    }
+
+    /// What it reads, but for noise, at a road-wheel angle, both \[rad\].
+    #[must_use]
+    pub fn reading(&self, angle: f64) -> f64 {
+        self.gain * angle + self.offset
+    }
 }
 
 /// The gyro.

@@ -4,6 +4,7 @@
 
 mod support;
 
+use kerbside_geometry::SteeringSensor;
 use kerbside_messages::{Raw, Travel, WheelStatus};
 use kerbside_odometry::{Ingest, IngestSettings, NoModel, Sensors};
 use support::{Car, car, sensors};
@@ -334,4 +335,16 @@ fn a_vehicle_of_which_nothing_can_be_known_is_refused() {
     let none = sensors([false, false, true, false], false, false);
     let refused = Ingest::with_sensors(&car(), &none, &IngestSettings::default());
     assert!(matches!(refused, Err(NoModel::NoTurning { wheel: "rl" })));
+}
+
+#[test]
+fn offset_and_gain_of_the_steering_sensor_are_taken_out() {
+    let mut vehicle = car();
+    let sensor = vehicle.steering_sensor.unwrap();
+    vehicle.steering_sensor = Some(SteeringSensor { offset: 0.02, gain: 1.1, ..sensor });
+    let (sensors, settings) = (sensors([true; 4], true, true), IngestSettings::default());
+    let ingest = Ingest::with_sensors(&vehicle, &sensors, &settings).unwrap();
+    let mut bench = Bench { ingest, ..Bench::four() };
+    let raw = Raw { steering: 1.1 * 0.25 + 0.02, ..bench.car.raw() };
+    assert!((bench.step(&raw).steering - 0.25).abs() < 1e-7);
 }

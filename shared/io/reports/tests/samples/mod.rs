@@ -3,9 +3,10 @@
 use kerbside_geometry::{Footprint, Pose, Wheel, math};
 use kerbside_reports::svg::Tone;
 use kerbside_reports::{
-    CommandSample, Drift, EstimateSample, Event, EventKind, Figures, Gap, JudgedOn, Latency, Model,
-    Motion, Outcome, ParkReport, Phase, Plan, ProcessFigures, Provenance, RefusalCount,
-    ReplayReport, Scene, WheelTravel,
+    CalibrateReport, CalibratedParameter, CommandSample, DerivedFigure, Drift, EndErrors,
+    EstimateSample, Event, EventKind, Figures, Gap, JudgedOn, Latency, Model, Motion, Outcome,
+    ParkReport, Phase, Plan, ProcessFigures, Provenance, ReckonedPath, RefusalCount, ReplayReport,
+    RunNote, RunPaths, RunResidual, Scene, WheelTravel,
 };
 
 const WHEELBASE: f64 = 0.5;
@@ -471,5 +472,82 @@ pub(crate) fn refused() -> ReplayReport {
         refusals: Vec::new(),
         notes: Vec::new(),
         ..replayed()
+    }
+}
+
+/// A calibration from three runs, one of which was rejected.
+pub(crate) fn calibrated() -> CalibrateReport {
+    let arc = |bend: f64| -> Vec<[f64; 2]> {
+        let at = |step: u32| {
+            Pose::default().advance(0.05 * f64::from(step), 0.05 * bend * f64::from(step))
+        };
+        (0..100).map(at).map(|pose| [pose.x, pose.y]).collect()
+    };
+    let ends = |run: &str, source: &str, yaw: f64| EndErrors {
+        run: run.to_owned(),
+        manoeuvre: "circle".to_owned(),
+        source: source.to_owned(),
+        before: Pose::new(0.21, -0.056, yaw),
+        after: Pose::new(0.004, 0.003, 0.1 * yaw),
+    };
+    let parameter = |name: &str, value: f64, identified: bool| CalibratedParameter {
+        name: name.to_owned(),
+        unit: "m".to_owned(),
+        nominal: 0.31,
+        value,
+        interval: [value - 0.001, value + 0.001],
+        identified,
+        closed_form: if identified { value + 1e-4 } else { f64::NAN },
+        decimals: 5,
+    };
+    let note = |name: &str, text: &str| RunNote { name: name.to_owned(), text: text.to_owned() };
+    CalibrateReport {
+        vehicle: "car <1:6> & more".to_owned(),
+        method: "joint least squares over all runs".to_owned(),
+        problem: None,
+        runs: [3, 4],
+        parameters: vec![parameter("track_front", 0.285, true), parameter("wheelbase", 0.3, false)],
+        derived: vec![DerivedFigure {
+            name: "epsilon rear".to_owned(),
+            value: -9e-5,
+            deviation: 1e-5,
+            unit: "m".to_owned(),
+        }],
+        basis: "runs taking turns".to_owned(),
+        left_out: vec![ends("left-0", "rear", -0.2), ends("left-0", "front", f64::NAN)],
+        outliers: vec![ends("left-2", "rear", 0.5)],
+        rms: vec![ends("rms of 2", "rear", 0.2)],
+        judged: Some(ends("rms of 2", "rear", 0.2)),
+        paths: vec![RunPaths {
+            run: "left-0".to_owned(),
+            manoeuvre: "circle".to_owned(),
+            reference: arc(0.6),
+            end: Some(Pose::new(0.3, 1.0, 2.0)),
+            reckoned: vec![
+                ReckonedPath { source: "rear".to_owned(), before: arc(0.55), after: arc(0.6) },
+                ReckonedPath { source: "front".to_owned(), before: arc(0.5), after: arc(0.601) },
+            ],
+        }],
+        residuals: vec![RunResidual {
+            run: "left-0".to_owned(),
+            travel: 9.4,
+            reference: (1.02, 120),
+            axles: (f64::NAN, 0),
+        }],
+        missing: vec![note("wheelbase", "full circles of 1.5 m radius to both sides")],
+        rejected: vec![note("left-2", "what is known of its pose at 3.0 m is off")],
+        findings: vec![note("all runs", "no turning")],
+        notes: vec!["imu.csv: column ax not used".to_owned()],
+        provenance: provenance("kerbside calibrate cases/car"),
+    }
+}
+
+/// A calibration that identifies nothing.
+pub(crate) fn uncalibrated() -> CalibrateReport {
+    CalibrateReport {
+        problem: Some("these runs identify nothing".to_owned()),
+        judged: Some(EndErrors { before: Pose::new(f64::NAN, 0.0, 0.0), ..EndErrors::default() }),
+        paths: vec![RunPaths { end: Some(Pose::new(f64::NAN, 0.0, 0.0)), ..RunPaths::default() }],
+        ..CalibrateReport::default()
     }
 }

@@ -49,7 +49,8 @@ pub(super) fn vehicle(reading: &Reading<'_, VehicleDraft>, draft: VehicleDraft) 
         reference: reading.has("reference").then_some(draft.reference),
     };
     let uncertainty = Uncertainty { fields: stated(draft.fields), effects: stated(draft.effects) };
-    VehicleFile { vehicle, uncertainty }
+    let calibration = reading.has("calibration").then_some(draft.calibration);
+    VehicleFile { vehicle, uncertainty, calibration }
 }
 
 fn stated<K: Ord>(map: BTreeMap<K, Option<f64>>) -> BTreeMap<K, f64> {

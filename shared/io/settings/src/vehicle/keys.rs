@@ -8,7 +8,7 @@ use kerbside_geometry::{
     Actuators, Drive, Footprint, Gyro, Limits, Pose, Reference, SteeringSensor, WHEELS,
 };
 
-use super::EFFECTS;
+use super::{Calibration, EFFECTS, calibration};
 use crate::declare::{Field, Kind, Range, Schema, Value};
 
 /// A vehicle as far as its file states it; what is not stated is NaN.
@@ -30,6 +30,7 @@ pub(crate) struct VehicleDraft {
     pub(super) reference: Reference,
     pub(super) fields: BTreeMap<&'static str, Option<f64>>,
     pub(super) effects: BTreeMap<(&'static str, &'static str), Option<f64>>,
+    pub(super) calibration: Calibration,
 }
 
 impl Default for VehicleDraft {
@@ -54,7 +55,7 @@ impl Default for VehicleDraft {
             counter_bits: 0,
             noise_per_distance: None,
             encoder_rate: N,
-            steering_sensor: SteeringSensor { noise: N, rate: N },
+            steering_sensor: SteeringSensor::new(N, N),
             gyro: Gyro { noise: N, rate: N },
             reference: Reference {
                 position_noise: N,
@@ -64,6 +65,7 @@ impl Default for VehicleDraft {
             },
             fields: BTreeMap::new(),
             effects: BTreeMap::new(),
+            calibration: Calibration::default(),
         }
     }
 }
@@ -125,7 +127,7 @@ fn declare() -> Schema<VehicleDraft> {
         VehicleDraft::default,
     );
     let schema = declare_sensors(declare_motion(declare_body(schema)));
-    declare_uncertainty(schema)
+    calibration::declare(declare_uncertainty(schema))
 }
 
 fn declare_body(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {
@@ -243,6 +245,18 @@ fn declare_sensors(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {
         .required("steering_sensor.rate", RATE, "Readings per second.", |v| {
             &mut v.steering_sensor.rate
         })
+        .key(
+            "steering_sensor.offset",
+            Kind::radians(Range::from(-PI).to(PI)),
+            "What it reads while the wheels stand straight; `kerbside calibrate` finds it.",
+            |v| &mut v.steering_sensor.offset,
+        )
+        .key(
+            "steering_sensor.gain",
+            Kind::number(Range::above(0.0).to(100.0)),
+            "Reading per road-wheel angle, beyond the offset.",
+            |v| &mut v.steering_sensor.gain,
+        )
         .optional_section("gyro", "The gyro. Absent: there is none.")
         .required(
             "gyro.noise",

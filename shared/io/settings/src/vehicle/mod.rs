@@ -1,6 +1,7 @@
 //! `vehicle.toml`: what the engineer believes the vehicle to be.
 
 mod build;
+mod calibration;
 mod checks;
 mod effects;
 mod keys;
@@ -14,6 +15,7 @@ use crate::declare::{Loaded, Reading, SourceFile};
 use crate::problem::Cause;
 use crate::sources::{FileKind, Sources};
 
+pub use calibration::{CALIBRATED, Calibration};
 pub use effects::EFFECTS;
 pub(crate) use keys::{VehicleDraft, schema};
 
@@ -24,6 +26,8 @@ pub struct VehicleFile {
     pub vehicle: Vehicle,
     /// How far a car in good order may differ.
     pub uncertainty: Uncertainty,
+    /// Where its values come from; none where it was not calibrated.
+    pub calibration: Option<Calibration>,
 }
 
 /// One standard deviation, per field, of what a car in good order may differ by.
@@ -63,6 +67,7 @@ pub(crate) fn load(file: &SourceFile) -> Result<Loaded<VehicleFile>, SettingsErr
     build::complete(&mut reading, &mut draft);
     if reading.is_sound() {
         checks::check(&mut reading, &draft);
+        calibration::check(&mut reading, &draft.calibration);
     }
     let settings = reading.settings(&mut draft);
     let vehicle = build::vehicle(&reading, draft);

@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 
 use crate::support;
-use kerbside_geometry::{Encoders, Pose, Vehicle};
+use kerbside_geometry::{Encoders, Pose, SteeringSensor, Vehicle};
 use kerbside_simulation::{Noise, SensorReading, Simulator};
 
 fn car() -> Vehicle {
@@ -167,4 +167,18 @@ fn white_noise_has_the_size_it_was_given() {
     }
     // Four standard errors: 9 %.
     assert!((steering / 1e-4 - 1.0).abs() < 0.09 && (gyro / 4e-4 - 1.0).abs() < 0.09);
+}
+
+#[test]
+fn a_steering_sensor_reads_with_its_own_offset_and_gain() {
+    let mut vehicle = car();
+    let sensor = vehicle.steering_sensor.unwrap();
+    vehicle.steering_sensor = Some(SteeringSensor { offset: 0.02, gain: 1.1, ..sensor });
+    let mut simulator = Simulator::new(&vehicle, Pose::default(), &Noise::NONE, 6);
+    assert_eq!(simulator.reading().steering, Some(0.02));
+    simulator.command(0.0, 0.0, 0.2);
+    simulator.advance(5.0);
+    let expected = 1.1 * simulator.steering() + 0.02;
+    assert!((simulator.reading().steering.unwrap() - expected).abs() < 1e-12);
+    assert!(simulator.steering() > 0.19);
 }

@@ -84,10 +84,8 @@ fn vehicle(root: &Table) -> Vehicle {
             noise_per_distance: None,
             rate: number(encoders, "rate"),
         }),
-        steering_sensor: optional("steering_sensor").map(|sensor| SteeringSensor {
-            noise: number(sensor, "noise"),
-            rate: number(sensor, "rate"),
-        }),
+        steering_sensor: optional("steering_sensor")
+            .map(|sensor| SteeringSensor::new(number(sensor, "noise"), number(sensor, "rate"))),
         gyro: optional("gyro")
             .map(|gyro| Gyro { noise: number(gyro, "noise"), rate: number(gyro, "rate") }),
         reference: optional("reference").map(reference),

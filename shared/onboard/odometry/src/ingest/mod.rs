@@ -4,7 +4,7 @@ mod counter;
 mod sequence;
 mod speedometer;
 
-use kerbside_geometry::{Vehicle, WHEELS};
+use kerbside_geometry::{SteeringSensor, Vehicle, WHEELS};
 use kerbside_messages::{Header, Nanos, Raw, Travel, WheelStatus};
 
 use crate::clock::{ClockMap, Mapped};
@@ -47,6 +47,7 @@ const EPOCH_STEP: u32 = 0x9e37_79b9;
 pub struct Ingest {
     sensors: Sensors,
     settings: IngestSettings,
+    steering: SteeringSensor,
     largest_steering: f64,
     largest_yaw_rate: f64,
     counters: [Counter; 4],
@@ -93,6 +94,7 @@ impl Ingest {
         Ok(Self {
             sensors: *sensors,
             settings: settings.clone(),
+            steering: vehicle.steering_sensor.unwrap_or(SteeringSensor::new(0.0, 0.0)),
             largest_steering: factor * vehicle.limits.steering + slack,
             largest_yaw_rate: fastest * wheels::largest_curvature(vehicle) + 1.0,
             counters: scales.map(Counter::new),
@@ -230,14 +232,15 @@ impl Ingest {
         travel.status = self.sensors.wheels.map(|present| unread(present).code());
     }
 
-    /// Takes the steering angle; true if it is out of belief.
+    /// Takes the steering angle, the sensor's offset and gain taken out; true if it is out of belief.
     fn take_steering(&mut self, raw: &Raw) -> bool {
         if raw.has_steering != 1 || !self.sensors.steering {
             return false;
         }
-        let believed = raw.steering.abs() <= self.largest_steering;
+        let angle = self.steering.angle(raw.steering);
+        let believed = angle.abs() <= self.largest_steering;
         if believed {
-            self.newest.steering = raw.steering;
+            self.newest.steering = angle;
             (self.newest.has_steering, self.newest.steering_is_new) = (1, 1);
         }
         !believed
