@@ -202,6 +202,7 @@ fn take_input(stack: &mut Stack, args: &ServiceArgs, input: &Path) -> Result<Sen
     let described = replay::describe(input, args.vehicle.as_deref(), args.sensors)?;
     stack.vehicle = described.file.vehicle;
     stack.uncertainty = described.file.uncertainty;
+    stack.calibration = described.file.calibration;
     stack.vehicle_file = described.origin;
     stack.vehicle_text = described.text;
     stack.interface = InterfaceSettings::Replay;

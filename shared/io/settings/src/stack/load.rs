@@ -86,6 +86,7 @@ fn stack(
         vehicle: vehicle.value.vehicle,
         vehicle_file: vehicle.file,
         uncertainty: vehicle.value.uncertainty,
+        calibration: vehicle.value.calibration,
         safety: [draft.safety, with_rights.safety],
         ingest: draft.ingest,
         estimator,

@@ -15,8 +15,8 @@ use kerbside_planning::PlannerSettings;
 use kerbside_safety::SafetySettings;
 use kerbside_tracking::TrackerSettings;
 
-use crate::Uncertainty;
 use crate::declare::choices;
+use crate::{Calibration, Uncertainty};
 
 pub use defaults::{REAL_TIME_TIMEOUTS, scaled_tracker};
 pub(crate) use keys::{StackDraft, schema};
@@ -33,6 +33,8 @@ pub struct Stack {
     pub vehicle_text: String,
     /// How far a car in good order may differ from the nominal one.
     pub uncertainty: Uncertainty,
+    /// The calibration that the vehicle's values come from, where there was one.
+    pub calibration: Option<Calibration>,
     /// Supervision and gate, with and without real-time rights: see [`Stack::safety`].
     safety: [SafetySettings; 2],
     /// Of the ingest stage.
