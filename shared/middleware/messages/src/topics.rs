@@ -182,7 +182,7 @@ macro_rules! topics {
 
             impl Message for $payload {
                 const TOPIC: &'static Topic = &$constant;
-                const TYPE_NAME: &'static str = concat!("kerbside.", stringify!($payload), ".v1");
+                const TYPE_NAME: &'static str = concat!("kerbside.", stringify!($payload), ".v2");
 
                 fn header(&self) -> &Header {
                     &self.header

@@ -19,6 +19,7 @@
 mod clock;
 mod estimator;
 mod ingest;
+mod parameters;
 mod sensors;
 mod settings;
 mod wheels;
@@ -26,5 +27,8 @@ mod wheels;
 pub use clock::{ClockMap, Mapped};
 pub use estimator::{Estimator, EstimatorInputs};
 pub use ingest::Ingest;
+pub use parameters::{
+    PARAMETERS, Parameter, ParameterCovariance, ParameterEstimate, ParameterPrior,
+};
 pub use sensors::{NoModel, Sensors, WheelSignal, model_for};
-pub use settings::{EstimatorSettings, IngestSettings, InitialPose};
+pub use settings::{EstimatorSettings, Filter, IngestSettings, InitialPose};

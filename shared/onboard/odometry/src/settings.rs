@@ -23,9 +23,27 @@ impl Default for IngestSettings {
     }
 }
 
+/// How the estimator makes a pose of what the vehicle measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Filter {
+    /// The vehicle's odometry model alone: with two rear wheels these and nothing else.
+    Rear,
+    /// The filter of Lee, Chung and Chang as published, the front pose taken from the last fused
+    /// one; where there is no front axle, as `Rear`. Its covariance is far too small.
+    Paper,
+    /// The same, the front pose integrated on its own from the start: the other reading.
+    PaperOwn,
+    /// Every sensor a measurement of the motion with its own noise, what they have in common
+    /// carried with its uncertainty.
+    #[default]
+    Fused,
+}
+
 /// Of the estimator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimatorSettings {
+    /// The filter.
+    pub filter: Filter,
     /// Random part of a wheel's travel, standard deviation \[m/sqrt(m)\], where the vehicle's file
     /// states none.
     pub wheel_noise: f64,
@@ -47,6 +65,7 @@ pub struct EstimatorSettings {
 impl Default for EstimatorSettings {
     fn default() -> Self {
         Self {
+            filter: Filter::default(),
             wheel_noise: 0.001,
             steering_noise: 0.0035,
             gyro_noise: 0.003,

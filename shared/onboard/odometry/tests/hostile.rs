@@ -83,7 +83,7 @@ proptest! {
     ) {
         let vehicle = support::fine_car(40);
         let mut chain = Chain::new(&vehicle, &placed());
-        let mut driven = Car::new(vehicle);
+        let mut driven = Car::new(vehicle).rolling(0.3, 0.2);
         chain.feed(&driven.raw());
         for (fate, mask) in fates {
             driven.roll(0.3, 0.2);
@@ -99,7 +99,8 @@ proptest! {
         chain.feed(&driven.raw());
         let error = chain.pose().distance(&driven.truth);
         prop_assert_eq!(chain.odometry.state, 1);
-        prop_assert!(error < 1e-3, "{} m", error);
-        prop_assert!((chain.odometry.yaw - driven.truth.yaw).abs() < 1e-3);
+        // Where wheels come at different times, each weighs for itself: a period is 1.5 mm.
+        prop_assert!(error < 3e-3, "{} m", error);
+        prop_assert!((chain.odometry.yaw - driven.truth.yaw).abs() < 3e-3);
     }
 }

@@ -1,9 +1,9 @@
-//! What the correction is worth on the S path, over many noisy drives.
+//! What the paper's correction is worth on the S path, over many noisy drives.
 
 mod support;
 
 use kerbside_messages::OdometryModel as Model;
-use kerbside_odometry::{EstimatorSettings, Sensors};
+use kerbside_odometry::{EstimatorSettings, Filter, Sensors};
 use support::{Car, Chain, car, s_path, sensors};
 
 /// Rear noise \[m/sqrt(m)\]; the front's is scaled against it.
@@ -17,13 +17,17 @@ struct Outcome {
     gated: u32,
 }
 
+fn with(filter: Filter) -> EstimatorSettings {
+    EstimatorSettings { filter, ..EstimatorSettings::default() }
+}
+
 fn drive(sensors: Sensors, front: f64, top: f64, rate: f64, trials: u64) -> Outcome {
     let vehicle = car();
     let path = s_path(&vehicle, top, 1.0 / rate);
     let (mut x, mut y, mut square) = (0.0, 0.0, 0.0);
     let (mut corrections, mut gated) = (0, 0);
     for trial in 0..trials {
-        let mut chain = Chain::with(&vehicle, &sensors, &EstimatorSettings::default());
+        let mut chain = Chain::with(&vehicle, &sensors, &with(Filter::Paper));
         let mut car = Car::new(car()).noisy(20_240 + trial, NOISE * front, NOISE, 0.0035);
         car.period = (1e9 / rate) as u64;
         chain.feed(&car.raw());
@@ -85,7 +89,7 @@ fn the_rear_models_covariance_is_the_true_spread() {
     let path = s_path(&vehicle, 0.26, 0.02);
     let (mut sum, trials) = (0.0, 150);
     for trial in 0..trials {
-        let mut chain = Chain::with(&vehicle, &rear, &EstimatorSettings::default());
+        let mut chain = Chain::with(&vehicle, &rear, &with(Filter::Rear));
         let mut car = Car::new(car()).noisy(400 + trial, NOISE, NOISE, 0.0);
         car.period = 20_000_000;
         chain.feed(&car.raw());

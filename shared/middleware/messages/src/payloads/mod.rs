@@ -9,8 +9,8 @@ mod vehicle;
 
 pub use control::{Actuator, AlterReason, Command, Inhibit, Permit, TrackingPhase, TrackingStop};
 pub use motion::{
-    EstimatorState, Fix, FixVerdict, Odometry, OdometryModel, ResetReason, Restore, Travel,
-    WheelStatus,
+    EstimatorState, FilterKind, Fix, FixVerdict, Odometry, OdometryModel, ResetReason, Restore,
+    Travel, WheelStatus, WheelUse,
 };
 pub use planning::{
     MAX_OBSTACLES, MAX_PLAN_POINTS, MAX_VERTICES, Plan, PlanAnswer, PlanRequest, PlanVerdict,

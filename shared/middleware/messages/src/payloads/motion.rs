@@ -98,7 +98,7 @@ codes! {
     pub enum OdometryModel {
         /// Nothing can be computed.
         None = 0 "none",
-        /// Rear wheels predict, front wheels and steering correct: the paper's filter.
+        /// Rear and front wheels with the steering sensor.
         RearFront = 1 "rear and front wheels",
         /// Two rear wheels.
         Rear = 2 "rear wheels",
@@ -132,9 +132,9 @@ codes! {
     pub enum FixVerdict {
         /// There was none.
         None = 0 "none",
-        /// It set the pose.
+        /// It set the pose, or corrected it.
         Accepted = 1 "accepted",
-        /// The vehicle moves.
+        /// The vehicle moves, and the fix contradicts its pose, or there is none to correct.
         Moving = 2 "refused: the vehicle moves",
         /// Too old.
         Late = 3 "refused: too old",
@@ -142,6 +142,36 @@ codes! {
         Future = 4 "refused: stamp in the future",
         /// Not a covariance.
         Covariance = 5 "refused: covariance",
+    }
+}
+
+codes! {
+    /// What the estimator does with a wheel at present.
+    pub enum WheelUse {
+        /// The vehicle has no such encoder, or it was not read.
+        None = 0 "not read",
+        /// Part of the pose.
+        Used = 1 "used",
+        /// It contradicts all others: beyond its gate.
+        Gated = 2 "refused: contradicts the others",
+        /// Rear and front axle differ, and it is this axle.
+        Slipping = 3 "refused: its axle slips",
+        /// This filter does without it.
+        Unneeded = 4 "not needed",
+    }
+}
+
+codes! {
+    /// Which filter made the estimate.
+    pub enum FilterKind {
+        /// One axle or wheel, as the odometry model says.
+        Rear = 0 "rear",
+        /// The paper's: rear wheels predict, front wheels correct, from the last fused pose.
+        Paper = 1 "paper",
+        /// The paper's, the front pose integrated on its own from the start.
+        PaperOwn = 2 "paper, front on its own",
+        /// Every sensor a measurement of the motion.
+        Fused = 3 "fused",
     }
 }
 
@@ -164,10 +194,14 @@ layout! {
         pub steering: f64,
         /// Covariance of (x, y, yaw), row by row \[m^2, m rad, rad^2\].
         pub covariance: [f64; 9],
-        /// Newest innovation (x, y, yaw) \[m, m, rad\].
+        /// Newest innovation (x, y, yaw): of the front pose, or of a fix where the filter is `Fused` \[m, m, rad\].
         pub innovation: [f64; 3],
         /// Squared Mahalanobis length of that innovation.
         pub test_ratio: f64,
+        /// Squared innovation over its variance of fl, fr, rl, rr in the newest block of path; 0 where nothing else tells.
+        pub wheel_ratio: [f64; 4],
+        /// What the sensors disagree about in the newest block, squared and per degree of freedom: 1 on average.
+        pub block_ratio: f64,
         /// Distance rolled in either direction since the start \[m\].
         pub distance: f64,
         /// The cumulative travel of fl, fr, rl, rr this pose stands for \[m\].
@@ -196,8 +230,10 @@ layout! {
         pub corrected: u8,
         /// 1: the travel behind this step had a gap.
         pub gap: u8,
-        /// Unused.
-        pub reserved: [u8; 5],
+        /// [`FilterKind`].
+        pub filter: u8,
+        /// [`WheelUse`] of fl, fr, rl, rr.
+        pub wheel_use: [u8; 4],
         /// Sequence of the newest fix judged, 0 for none.
         pub fix_sequence: u64,
     }
@@ -209,7 +245,10 @@ impl Odometry {
         within("twist", &[self.speed, self.yaw_rate, self.steering], 1e3)?;
         covariance("covariance", &self.covariance)?;
         finite("innovation", &self.innovation)?;
-        finite("test_ratio", &[self.test_ratio, self.distance])?;
+        finite("test_ratio", &[self.test_ratio, self.block_ratio, self.distance])?;
+        finite("wheel_ratio", &self.wheel_ratio)?;
+        known("filter", FilterKind::from_code(self.filter))?;
+        self.wheel_use.iter().try_for_each(|code| known("wheel_use", WheelUse::from_code(*code)))?;
         within("travel", &self.travel, FAR)?;
         known("state", EstimatorState::from_code(self.state))?;
         known("model", OdometryModel::from_code(self.model))?;
@@ -235,7 +274,7 @@ impl Restore {
 }
 
 layout! {
-    /// An absolute pose of the rear-axle centre, true at `header.stamp`.
+    /// An absolute pose, of the rear-axle centre or of a marker on the vehicle, true at `header.stamp`.
     pub struct Fix {
         /// Header.
         pub header: Header,
@@ -247,6 +286,12 @@ layout! {
         pub yaw: f64,
         /// Covariance of (x, y, yaw), row by row \[m^2, m rad, rad^2\].
         pub covariance: [f64; 9],
+        /// Where on the vehicle that is, `body_from_marker`; zeros for the rear-axle centre \[m\].
+        pub marker_x: f64,
+        /// The same, to the left \[m\].
+        pub marker_y: f64,
+        /// Heading of the marker in the body frame \[rad\].
+        pub marker_yaw: f64,
         /// Who says so: UTF-8, filled up with zeros.
         pub source: [u8; 32],
     }
@@ -255,6 +300,7 @@ layout! {
 impl Fix {
     pub(crate) fn check_fields(&self) -> Result<(), Refusal> {
         within("pose", &[self.x, self.y, self.yaw], FAR)?;
+        within("marker", &[self.marker_x, self.marker_y, self.marker_yaw], 1e3)?;
         covariance("covariance", &self.covariance)
     }
 }

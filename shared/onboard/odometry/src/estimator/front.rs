@@ -33,7 +33,10 @@ pub(crate) struct Record {
 /// (19).
 ///
 /// The paper leaves open whether the front pose is integrated on its own from the start, or from
-/// the last fused pose. Here it is the latter: each measurement z is the front axle's motion
+/// the last fused pose. With `own` it is the former: successive measurements share all earlier
+/// errors, which the filter takes as independent, and the estimate follows the front axle; they are
+/// made at every reading, since what counts hide is small beside such a pose's variance. Without
+/// it is the latter: each measurement z is the front axle's motion
 /// applied to the last fused pose, H = I, the update in Joseph form. Front and prediction share
 /// that pose's error, which the filter takes as independent: its estimate is nearly the best there
 /// is, its covariance is far too small and stays bounded while the true error grows with distance.
@@ -49,6 +52,8 @@ pub(crate) struct FrontCorrection {
     pair: FrontPair,
     gate: f64,
     block: f64,
+    /// The front pose is integrated on its own from the start.
+    own: bool,
     /// Variance of (distance, turn) that the counts of both axles leave in a block.
     quantisation: Matrix2<f64>,
     /// The last fused pose, and the front axle's way from there with its covariance.
@@ -69,11 +74,13 @@ impl FrontCorrection {
         pair: FrontPair,
         metres_per_count: [f64; 4],
         gate: f64,
+        own: bool,
     ) -> Self {
         Self {
             pair,
             gate,
-            block: BLOCK * vehicle.wheelbase,
+            own,
+            block: if own { 0.0 } else { BLOCK * vehicle.wheelbase },
             quantisation: quantisation(vehicle, metres_per_count),
             anchor: None,
             way: Estimate::default(),
@@ -121,13 +128,18 @@ impl FrontCorrection {
                     self.begin(&estimate.pose, wheels);
                 }
             }
-            _ => self.begin(&estimate.pose, wheels),
+            _ => {
+                self.anchor = None;
+                self.begin(&estimate.pose, wheels);
+            }
         }
     }
 
     fn begin(&mut self, fused: &Pose, wheels: &Odometer) {
+        if !self.own || self.anchor.is_none() {
+            self.way = Estimate { pose: *fused, covariance: Matrix3::zeros() };
+        }
         self.anchor = Some(*fused);
-        self.way = Estimate { pose: *fused, covariance: Matrix3::zeros() };
         self.applied = [wheels.newest(LEFT), wheels.newest(RIGHT)];
         (self.rolled, self.net) = (0.0, 0.0);
         (self.unread, self.pieces) = (0.0, 0);

@@ -17,12 +17,14 @@ pub(crate) struct GyroIntegral {
     held: f64,
     turn: f64,
     variance: f64,
+    /// When it was last cleared.
+    since: Option<Nanos>,
 }
 
 impl GyroIntegral {
     /// Of a gyro with this standard deviation \[rad/s\].
     pub(crate) fn new(noise: f64) -> Self {
-        Self { noise, newest: None, reached: 0, held: 0.0, turn: 0.0, variance: 0.0 }
+        Self { noise, newest: None, reached: 0, held: 0.0, turn: 0.0, variance: 0.0, since: None }
     }
 
     /// Goes on to `stamp`, at which `rate` \[rad/s\] was read, if any was.
@@ -33,6 +35,7 @@ impl GyroIntegral {
             self.held += hold;
         }
         self.reached = stamp;
+        self.since.get_or_insert(stamp);
         if let Some(rate) = rate {
             self.take(rate, stamp);
         }
@@ -58,6 +61,17 @@ impl GyroIntegral {
     /// The turn went into the pose, or was none.
     pub(crate) fn clear(&mut self) {
         (self.turn, self.variance) = (0.0, 0.0);
+        self.since = Some(self.reached);
+    }
+
+    /// Time of that turn \[s\].
+    pub(crate) fn time(&self) -> f64 {
+        self.since.map_or(0.0, |since| elapsed(self.reached, since))
+    }
+
+    /// Variance of a reading \[rad^2/s^2\].
+    pub(crate) fn rate_variance(&self) -> f64 {
+        self.noise * self.noise
     }
 }
 

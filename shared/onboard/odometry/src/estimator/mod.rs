@@ -2,6 +2,7 @@
 
 mod fixes;
 mod front;
+mod fused;
 mod gyro;
 mod increment;
 mod kinematics;
@@ -11,16 +12,18 @@ mod twist;
 
 use kerbside_geometry::{Pose, Vehicle};
 use kerbside_messages::{
-    EstimatorState, Fix, FixVerdict, Header, Nanos, Odometry, ResetReason, Restore, Travel,
-    WheelStatus,
+    EstimatorState, FilterKind, Fix, FixVerdict, Header, Nanos, Odometry, ResetReason, Restore,
+    Travel, WheelStatus, WheelUse,
 };
 use nalgebra::{Matrix3, Vector3};
 
+use crate::parameters::{ParameterEstimate, ParameterPrior};
 use crate::sensors::{NoModel, Sensors};
-use crate::settings::{EstimatorSettings, InitialPose};
+use crate::settings::{EstimatorSettings, Filter, InitialPose};
 use crate::wheels::{self, elapsed};
 use fixes::{Rest, Ruling};
 use front::FrontCorrection;
+use fused::{Fused, Reading, Setup, Taken, Turned};
 use gyro::GyroIntegral;
 use increment::{Estimate, Increment};
 use model::{Aids, Model};
@@ -31,6 +34,9 @@ use twist::Twist;
 /// off by so much \[s\], before the pose counts as lost.
 const GAP_MARGIN: f64 = 5.0;
 const GAP_SLACK: f64 = 0.1;
+
+/// So long the fused filter awaits a wheel \[s\] before it goes on without.
+const LONGEST_AWAITING: f64 = 0.3;
 
 /// What the estimator takes in a step.
 #[derive(Clone, Copy, Debug)]
@@ -71,10 +77,12 @@ pub struct EstimatorInputs<'a> {
 pub struct Estimator {
     model: Model,
     front: Option<FrontCorrection>,
+    fused: Option<Fused>,
     settings: EstimatorSettings,
     curvature: f64,
     wheels: Odometer,
     gyro: GyroIntegral,
+    uses_gyro: bool,
     steering: Option<f64>,
     twist: Twist,
     estimate: Estimate,
@@ -90,6 +98,10 @@ pub struct Estimator {
     rolled: Nanos,
     moved: Option<Nanos>,
     read: Nanos,
+    /// Stamp of the newest travel.
+    seen: Nanos,
+    /// Since when some wheels were read and others are awaited.
+    awaiting: Option<Nanos>,
     waiting: Option<Fix>,
     verdict: FixVerdict,
     fix_sequence: u64,
@@ -113,13 +125,32 @@ impl Estimator {
         sensors: &Sensors,
         settings: &EstimatorSettings,
     ) -> Result<Self, NoModel> {
+        let prior = ParameterPrior::calibrated(vehicle);
+        Self::with_prior(vehicle, sensors, settings, &prior)
+    }
+
+    /// A stage for `vehicle` whose calibration left open what `prior` says.
+    ///
+    /// # Errors
+    /// [`NoModel`] where no pose can be computed from what it measures.
+    pub fn with_prior(
+        vehicle: &Vehicle,
+        sensors: &Sensors,
+        settings: &EstimatorSettings,
+        prior: &ParameterPrior,
+    ) -> Result<Self, NoModel> {
         let scales = wheels::scales(vehicle, sensors)?;
-        let (model, front) = Model::new(vehicle, sensors, settings, &scales)?;
+        let (model, front) = Model::new(vehicle, sensors, settings, prior, &scales)?;
+        let fused = (settings.filter == Filter::Fused)
+            .then(|| Fused::new(Setup::new(vehicle, sensors, settings, prior, &scales)));
+        let uses_gyro = model.uses_gyro() || fused.is_some() && sensors.gyro;
         let gyro_noise = vehicle.gyro.map_or(settings.gyro_noise, |gyro| gyro.noise);
         let mut estimator = Self {
             wheels: Odometer::new(scales, model.needed()),
             model,
             front,
+            fused,
+            uses_gyro,
             settings: settings.clone(),
             curvature: wheels::largest_curvature(vehicle),
             gyro: GyroIntegral::new(gyro_noise),
@@ -137,6 +168,8 @@ impl Estimator {
             rolled: 0,
             moved: None,
             read: 0,
+            seen: 0,
+            awaiting: None,
             waiting: None,
             verdict: FixVerdict::None,
             fix_sequence: 0,
@@ -155,9 +188,6 @@ impl Estimator {
         if let Some(restore) = inputs.restore {
             self.take_restore(restore, travel);
         }
-        if let Some(front) = &mut self.front {
-            front.record_mut().corrected = false;
-        }
         self.take_aids(travel);
         let brought = self.take_wheels(travel);
         self.gap_pending |= gap || brought.bridged;
@@ -166,8 +196,9 @@ impl Estimator {
         }
         self.unusable = self.unusable.wrapping_add(u32::from(brought.lacking));
         if self.standstill(travel.header.stamp) {
-            self.gyro.clear();
+            self.rest(travel);
         }
+        self.seen = travel.header.stamp;
         self.take_fix(inputs.fix, travel.header.stamp);
         self.write(travel, gap, out);
     }
@@ -199,6 +230,9 @@ impl Estimator {
         if let Some(front) = &mut self.front {
             front.restart();
         }
+        if let Some(fused) = &mut self.fused {
+            fused.place(&self.estimate);
+        }
     }
 
     /// Takes up what an earlier life knew; what rolled by since is the next increment.
@@ -219,6 +253,10 @@ impl Estimator {
             return;
         }
         self.jump(estimate, EstimatorState::Valid, ResetReason::Restored);
+        if let Some(fused) = &mut self.fused {
+            fused.inherit(&estimate);
+            self.estimate = fused.estimate();
+        }
         self.wheels.restore(known.travel);
         self.gap_pending = true;
         self.rolled = known.header.stamp;
@@ -238,13 +276,24 @@ impl Estimator {
             record.corrections = record.corrections.wrapping_add(known.corrections);
             record.gated = record.gated.wrapping_add(known.gated);
         }
+        if let Some(fused) = &mut self.fused {
+            let statistics = fused.statistics_mut();
+            statistics.corrections = statistics.corrections.wrapping_add(known.corrections);
+            statistics.gated = statistics.gated.wrapping_add(known.gated);
+        }
     }
 
     fn take_aids(&mut self, travel: &Travel) {
         if travel.has_steering == 1 {
             self.steering = Some(travel.steering);
         }
-        if self.model.uses_gyro() {
+        if let Some(front) = &mut self.front {
+            front.record_mut().corrected = false;
+        }
+        if let Some(fused) = &mut self.fused {
+            fused.look(travel);
+        }
+        if self.uses_gyro {
             let rate = (travel.yaw_rate_is_new == 1).then_some(travel.yaw_rate);
             self.gyro.advance(travel.header.stamp, rate);
         }
@@ -264,14 +313,18 @@ impl Estimator {
 
     /// Brings what the wheels have rolled into the pose, if all that the model needs is there.
     fn roll(&mut self, travel: &Travel) {
-        if !self.wheels.ready() {
-            return;
-        }
         let stamp = travel.header.stamp;
         let since = elapsed(stamp, self.rolled);
+        if !self.wheels.ready() && !self.goes_without(stamp) {
+            return;
+        }
         if self.gap_pending && self.wheels.beyond_belief(since, GAP_SLACK, GAP_MARGIN) {
             self.lose();
             self.applied(stamp, 0.0, 0.0);
+            return;
+        }
+        if self.fused.is_some() {
+            self.fuse(travel);
             return;
         }
         let aids = Aids { steering: self.steering, gyro: &self.gyro };
@@ -292,8 +345,67 @@ impl Estimator {
         self.applied(stamp, piece.distance, piece.turn);
     }
 
+    /// A wheel was awaited for so long that the fused filter goes on with the others.
+    fn goes_without(&mut self, stamp: Nanos) -> bool {
+        let since = *self.awaiting.get_or_insert(stamp);
+        self.fused.is_some()
+            && self.wheels.telling().contains(&true)
+            && (elapsed(stamp, since) > LONGEST_AWAITING || self.wheels.ready_without_lost())
+    }
+
+    /// The same with the fused filter.
+    fn fuse(&mut self, travel: &Travel) {
+        let stamp = travel.header.stamp;
+        let reading = self.reading(stamp);
+        let Some(fused) = &mut self.fused else { return };
+        let Some(piece) = fused.step(&reading) else {
+            self.unusable = self.unusable.wrapping_add(1);
+            return;
+        };
+        self.estimate = fused.estimate();
+        self.gap_pending = false;
+        if reading.moves() {
+            self.gyro.clear();
+        }
+        self.distance += piece.distance.abs();
+        self.applied(stamp, piece.distance, piece.turn);
+    }
+
+    fn reading(&self, stamp: Nanos) -> Reading {
+        let read = self.wheels.telling();
+        let turned = self.gyro.turn().filter(|_| self.uses_gyro).map(|(turn, variance)| {
+            let time = self.gyro.time();
+            let held = self.gyro.rate_variance() * time * time;
+            Turned { turn, variance: variance.max(held), time }
+        });
+        let start = if self.wheels.ready() { self.seen.max(self.rolled) } else { self.rolled };
+        Reading {
+            start: start.min(stamp),
+            end: stamp,
+            travel: core::array::from_fn(|wheel| {
+                if read[wheel] { self.wheels.unapplied(wheel) } else { 0.0 }
+            }),
+            read,
+            begun: self.wheels.beginning(),
+            aligned: self.wheels.aligned(),
+            turned,
+            gap: self.gap_pending.then_some(self.curvature),
+        }
+    }
+
+    /// A vehicle that stands does not turn: what the gyro reads is its bias.
+    fn rest(&mut self, travel: &Travel) {
+        self.gyro.clear();
+        if let Some(fused) = self.fused.as_mut().filter(|_| self.uses_gyro) {
+            if travel.yaw_rate_is_new == 1 {
+                fused.rest(travel.yaw_rate, self.gyro.rate_variance());
+            }
+        }
+    }
+
     fn applied(&mut self, stamp: Nanos, distance: f64, turn: f64) {
         self.wheels.apply();
+        self.awaiting = None;
         self.rolled = stamp;
         self.twist.push(stamp, distance, turn);
     }
@@ -333,14 +445,28 @@ impl Estimator {
         let rest = Rest { standstill: self.standstill(now), moved: self.moved.unwrap_or(now) };
         match fixes::judge(&fix, now, &rest, self.settings.fix_age) {
             Ruling::Wait => self.waiting = Some(fix),
-            Ruling::Said(verdict) => {
+            Ruling::Said(ruled) => {
                 self.waiting = None;
+                let verdict = self.corrected(&fix, ruled);
                 (self.verdict, self.fix_sequence) = (verdict, fix.header.sequence);
-                if verdict == FixVerdict::Accepted {
-                    self.accept(&fix);
-                }
             }
         }
+    }
+
+    /// The fused filter corrects a valid pose by a fix, in motion as well. A fix that contradicts
+    /// it, and one without a pose to correct, sets the pose of a vehicle that stands.
+    fn corrected(&mut self, fix: &Fix, ruled: FixVerdict) -> FixVerdict {
+        let judged = matches!(ruled, FixVerdict::Accepted | FixVerdict::Moving);
+        let valid = self.state == EstimatorState::Valid;
+        let taken = self.fused.as_mut().filter(|_| judged && valid).map(|fused| fused.fix(fix));
+        if let (Some(Taken::Corrected), Some(fused)) = (taken, &self.fused) {
+            self.estimate = fused.estimate();
+            return FixVerdict::Accepted;
+        }
+        if ruled == FixVerdict::Accepted {
+            self.accept(fix);
+        }
+        ruled
     }
 
     fn accept(&mut self, fix: &Fix) {
@@ -365,11 +491,44 @@ impl Estimator {
         self.estimate.covariance + Matrix3::from_diagonal(&unknown)
     }
 
+    /// What the filter says of itself.
+    fn record(&self) -> fused::Statistics {
+        if let Some(fused) = &self.fused {
+            return *fused.statistics();
+        }
+        let front = self.front.as_ref().map(|front| *front.record()).unwrap_or_default();
+        fused::Statistics {
+            innovation: front.innovation,
+            test_ratio: front.test_ratio,
+            corrections: front.corrections,
+            gated: front.gated,
+            corrected: front.corrected,
+            ..fused::Statistics::default()
+        }
+    }
+
+    fn wheel_use(&self) -> [WheelUse; 4] {
+        if let Some(fused) = &self.fused {
+            return fused.uses();
+        }
+        let needed = self.model.needed();
+        core::array::from_fn(|wheel| match needed[wheel] || self.front.is_some() {
+            true => WheelUse::Used,
+            false => WheelUse::Unneeded,
+        })
+    }
+
+    /// What the fused filter has learnt of the vehicle's parameters; none for other filters.
+    #[must_use]
+    pub fn parameters(&self) -> Option<ParameterEstimate> {
+        self.fused.as_ref().map(Fused::parameters)
+    }
+
     fn write(&self, travel: &Travel, gap: bool, out: &mut Odometry) {
         let stamp = travel.header.stamp;
         let standstill = self.standstill(stamp);
         let (speed, yaw_rate) = if standstill { (0.0, 0.0) } else { self.twist.at(stamp) };
-        let record = self.front.as_ref().map(|front| *front.record()).unwrap_or_default();
+        let record = self.record();
         let mut covariance = [0.0; 9];
         covariance.copy_from_slice(self.published_covariance().as_slice());
         *out = Odometry {
@@ -383,6 +542,8 @@ impl Estimator {
             covariance,
             innovation: record.innovation,
             test_ratio: record.test_ratio,
+            wheel_ratio: record.wheel_ratio,
+            block_ratio: record.block_ratio,
             distance: self.distance,
             travel: self.wheels.applied(),
             counter_epoch: travel.counter_epoch,
@@ -397,9 +558,20 @@ impl Estimator {
             standstill: u8::from(standstill),
             corrected: u8::from(record.corrected),
             gap: u8::from(gap),
+            filter: filter_kind(self.settings.filter).code(),
+            wheel_use: self.wheel_use().map(WheelUse::code),
             fix_sequence: self.fix_sequence,
             ..Odometry::default()
         };
+    }
+}
+
+fn filter_kind(filter: Filter) -> FilterKind {
+    match filter {
+        Filter::Rear => FilterKind::Rear,
+        Filter::Paper => FilterKind::Paper,
+        Filter::PaperOwn => FilterKind::PaperOwn,
+        Filter::Fused => FilterKind::Fused,
     }
 }
 

@@ -4,12 +4,14 @@ use kerbside_geometry::{Vehicle, Wheel};
 use kerbside_messages::OdometryModel;
 
 use super::front::FrontCorrection;
+use super::fused;
 use super::gyro::GyroIntegral;
 use super::increment::Increment;
 use super::kinematics::{FrontPair, GyroWheel, RearPair, SteeredWheel};
 use super::odometer::Odometer;
+use crate::parameters::ParameterPrior;
 use crate::sensors::{NoModel, Sensors};
-use crate::settings::EstimatorSettings;
+use crate::settings::{EstimatorSettings, Filter};
 use crate::wheels::WheelScale;
 
 /// Which wheels give the pose, and how.
@@ -43,16 +45,17 @@ impl Model {
         vehicle: &Vehicle,
         sensors: &Sensors,
         settings: &EstimatorSettings,
+        prior: &ParameterPrior,
         scales: &[WheelScale; 4],
     ) -> Result<(Self, Option<FrontCorrection>), NoModel> {
         let kind = sensors.model(vehicle)?;
         let wheel = sensors.single_wheel().ok_or(NoModel::NoWheel)?;
-        let stated = vehicle.encoders.and_then(|encoders| encoders.noise_per_distance);
-        let noise = stated.unwrap_or(settings.wheel_noise);
+        let noises = fused::wheel_noise(vehicle, settings, prior);
+        let noise = noises[wheel.index()];
         let steering =
             vehicle.steering_sensor.map_or(settings.steering_noise, |sensor| sensor.noise);
-        let rear = RearPair { track: vehicle.track_rear, noise };
-        let front = FrontPair::new(vehicle, noise, steering);
+        let rear = RearPair { track: vehicle.track_rear, noise: noises[2] };
+        let front = FrontPair::new(vehicle, noises[0], steering);
         let rolling = match kind {
             OdometryModel::RearFront | OdometryModel::Rear => Rolling::Rear(rear),
             OdometryModel::Front => Rolling::Front(front),
@@ -64,8 +67,10 @@ impl Model {
             }
         };
         let counts = scales.map(|scale| scale.metres_per_count);
-        let correction = (kind == OdometryModel::RearFront)
-            .then(|| FrontCorrection::new(vehicle, front, counts, settings.gate));
+        let own = settings.filter == Filter::PaperOwn;
+        let corrects = own || settings.filter == Filter::Paper;
+        let correction = (corrects && kind == OdometryModel::RearFront)
+            .then(|| FrontCorrection::new(vehicle, front, counts, settings.gate, own));
         Ok((Self { kind, rolling }, correction))
     }
 

@@ -30,6 +30,13 @@ pub(crate) struct Odometer {
     based: [bool; 4],
     /// Read since the pose took it up.
     fresh: [bool; 4],
+    /// A travel was known when the pose was rolled last.
+    tracked: [bool; 4],
+    /// Not read between the last two times that the pose was rolled.
+    lost: [bool; 4],
+    /// Read with the newest travel, and with that with which the pose was rolled last.
+    now: [bool; 4],
+    then: [bool; 4],
 }
 
 impl Odometer {
@@ -37,7 +44,19 @@ impl Odometer {
     pub(crate) fn new(scales: [WheelScale; 4], needed: [bool; 4]) -> Self {
         let no = [false; 4];
         let zero = [0.0; 4];
-        Self { scales, needed, newest: zero, applied: zero, known: no, based: no, fresh: no }
+        Self {
+            scales,
+            needed,
+            newest: zero,
+            applied: zero,
+            known: no,
+            based: no,
+            fresh: no,
+            tracked: no,
+            lost: no,
+            now: no,
+            then: no,
+        }
     }
 
     /// Another counter epoch: no travel of the old one means anything.
@@ -50,6 +69,9 @@ impl Odometer {
         self.applied = applied;
         self.based = [true; 4];
         self.fresh = self.known;
+        self.tracked = [true; 4];
+        self.lost = [false; 4];
+        self.then = [true; 4];
     }
 
     /// Takes what `travel` says of the wheels. Differences of cumulative travel alone are used, so
@@ -57,6 +79,7 @@ impl Odometer {
     pub(crate) fn read(&mut self, travel: &Travel) -> Brought {
         let mut brought = Brought::default();
         let mut unusable = false;
+        self.now = [false; 4];
         for index in 0..4 {
             let status = travel.wheel(index);
             if matches!(status, WheelStatus::Valid | WheelStatus::Zeroed) {
@@ -77,6 +100,7 @@ impl Odometer {
         let before = std::mem::replace(&mut self.newest[index], travel);
         let turned = self.known[index] && travel != before;
         self.known[index] = true;
+        self.now[index] = true;
         self.fresh[index] = true;
         if !self.based[index] {
             self.applied[index] = travel;
@@ -88,6 +112,11 @@ impl Odometer {
     /// Whether every needed wheel was read since the pose took it up.
     pub(crate) fn ready(&self) -> bool {
         (0..4).all(|index| !self.needed[index] || self.fresh[index])
+    }
+
+    /// The same, without wheels that the pose went on without.
+    pub(crate) fn ready_without_lost(&self) -> bool {
+        (0..4).all(|index| !self.needed[index] || self.fresh[index] || self.lost[index])
     }
 
     /// Travel of a wheel that is not yet in the pose \[m\].
@@ -106,7 +135,7 @@ impl Odometer {
     /// Whether a wheel has turned farther than any can within `elapsed` seconds, `slack` seconds
     /// and a factor allowed for, or may have turned so far that absolute counts no longer tell.
     pub(crate) fn beyond_belief(&self, elapsed: f64, slack: f64, margin: f64) -> bool {
-        (0..4).filter(|index| self.needed[*index]).any(|index| {
+        (0..4).filter(|index| self.needed[*index] && !self.lost[*index]).any(|index| {
             let scale = &self.scales[index];
             let reach = margin * scale.top_speed * (elapsed + slack);
             self.unapplied(index).abs() > reach + 2.0 * scale.metres_per_count
@@ -117,7 +146,26 @@ impl Odometer {
     /// The pose has taken up all that was read.
     pub(crate) fn apply(&mut self) {
         self.applied = self.newest;
+        self.tracked = self.based;
+        self.lost = self.fresh.map(|fresh| !fresh);
         self.fresh = [false; 4];
+        self.then = self.now;
+    }
+
+    /// Which wheels tell it over the very time since the pose was rolled last: their readings are
+    /// of one moment, then and now.
+    pub(crate) fn aligned(&self) -> [bool; 4] {
+        core::array::from_fn(|index| self.now[index] && self.then[index])
+    }
+
+    /// Which wheels were read for the first time: they tell nothing yet.
+    pub(crate) fn beginning(&self) -> [bool; 4] {
+        core::array::from_fn(|index| self.fresh[index] && !self.tracked[index])
+    }
+
+    /// Which wheels tell how far they turned since the pose took them up.
+    pub(crate) fn telling(&self) -> [bool; 4] {
+        core::array::from_fn(|index| self.fresh[index] && self.tracked[index])
     }
 
     /// The newest travels \[m\].

@@ -3,6 +3,8 @@
 #![allow(dead_code)] // Each test takes what it needs.
 #![allow(clippy::unwrap_used)] // Helpers of tests are tests.
 
+pub(crate) mod scatter;
+
 use kerbside_geometry::{Encoders, Gyro, Limits, Pose, Vehicle, WHEELS};
 use kerbside_messages::{Header, Odometry, Raw, Travel};
 use kerbside_odometry::{
@@ -82,6 +84,13 @@ impl Car {
         self.random = Pcg64::seed_from_u64(seed);
         self.noise = [front, front, rear, rear];
         self.steering_noise = steering;
+        self
+    }
+
+    /// It already steers by `angle` \[rad\] and rolls at `speed` \[m/s\] when it is first read: the
+    /// sensors see between readings what was at both ends.
+    pub(crate) fn rolling(mut self, speed: f64, angle: f64) -> Self {
+        (self.speed, self.angle) = (speed, angle);
         self
     }
 
