@@ -85,6 +85,7 @@ fn content(args: &FixArgs) -> Result<Fix, Failure> {
         yaw: angle::radians(args.yaw),
         covariance: [position, 0.0, 0.0, 0.0, position, 0.0, 0.0, 0.0, yaw],
         source: text::from_str("operator"),
+        ..Fix::default()
     };
     // A sample that its receivers refuse would be lost without a word.
     let words = |refusal| Failure::new(Exit::Usage, format!("no pose for a vehicle: {refusal}"));

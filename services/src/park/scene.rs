@@ -52,6 +52,7 @@ impl Start {
             yaw: self.told.yaw,
             covariance: [position, 0.0, 0.0, 0.0, position, 0.0, 0.0, 0.0, yaw],
             source: text::from_str("park"),
+            ..Fix::default()
         }
     }
 }

@@ -43,17 +43,20 @@ fn table(trials: u64, residual: bool, legs: &[Leg], speed: f64) {
             let outcome = run(&case(filter), &car(), legs);
             row(&format!("{filter:?}"), &outcome, Some(rear.variance()));
         }
-        if residual {
-            let mut blind = case(Filter::Fused);
-            blind.sensors.steering = false;
-            row("Fused, no steering", &run(&blind, &car(), legs), Some(rear.variance()));
-        }
+        let mut blind = case(Filter::Fused);
+        blind.sensors.steering = false;
+        row("Fused, no steering", &run(&blind, &car(), legs), Some(rear.variance()));
     }
 }
 
-fn slips(trials: u64, legs: &[Leg], speed: f64) {
-    println!("slip at {speed} m/s");
-    let clean = run(&Case::new(Filter::Fused, 1.0, trials), &car(), legs);
+fn slips(trials: u64, legs: &[Leg], speed: f64, steering: bool) {
+    println!("slip at {speed} m/s{}", if steering { "" } else { ", no steering" });
+    let fused = |trials| {
+        let mut case = Case::new(Filter::Fused, 1.0, trials);
+        case.sensors.steering = steering;
+        case
+    };
+    let clean = run(&fused(trials), &car(), legs);
     row("none", &clean, None);
     for (name, travel) in [
         ("rl 5 mm", [0.0, 0.0, 0.005, 0.0]),
@@ -62,11 +65,11 @@ fn slips(trials: u64, legs: &[Leg], speed: f64) {
         ("both 30 mm", [0.0, 0.0, 0.030, 0.030]),
         ("fl -10 mm", [-0.010, 0.0, 0.0, 0.0]),
     ] {
-        let case = Case { spin: Some((0.4, travel)), ..Case::new(Filter::Fused, 1.0, trials) };
+        let case = Case { spin: Some((0.4, travel)), ..fused(trials) };
         row(name, &run(&case, &car(), legs), None);
     }
     for wheel in 0..4 {
-        let case = Case { dead: Some(wheel), ..Case::new(Filter::Fused, 1.0, trials) };
+        let case = Case { dead: Some(wheel), ..fused(trials) };
         row(&format!("wheel {wheel} dead"), &run(&case.residual(), &car(), legs), None);
     }
 }
@@ -95,7 +98,8 @@ fn main() {
         let legs = s_legs(speed, 0.02);
         table(trials, false, &legs, speed);
         table(trials, true, &legs, speed);
-        slips(trials, &legs, speed);
+        slips(trials, &legs, speed, true);
+        slips(trials, &legs, speed, false);
     }
     lengths(trials);
 }

@@ -248,7 +248,9 @@ impl Odometry {
         finite("test_ratio", &[self.test_ratio, self.block_ratio, self.distance])?;
         finite("wheel_ratio", &self.wheel_ratio)?;
         known("filter", FilterKind::from_code(self.filter))?;
-        self.wheel_use.iter().try_for_each(|code| known("wheel_use", WheelUse::from_code(*code)))?;
+        self.wheel_use
+            .iter()
+            .try_for_each(|code| known("wheel_use", WheelUse::from_code(*code)))?;
         within("travel", &self.travel, FAR)?;
         known("state", EstimatorState::from_code(self.state))?;
         known("model", OdometryModel::from_code(self.model))?;

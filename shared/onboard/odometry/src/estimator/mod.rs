@@ -3,17 +3,18 @@
 mod fixes;
 mod front;
 mod fused;
+mod fusing;
 mod gyro;
 mod increment;
 mod kinematics;
 mod model;
 mod odometer;
+mod output;
 mod twist;
 
 use kerbside_geometry::{Pose, Vehicle};
 use kerbside_messages::{
-    EstimatorState, FilterKind, Fix, FixVerdict, Header, Nanos, Odometry, ResetReason, Restore,
-    Travel, WheelStatus, WheelUse,
+    EstimatorState, Fix, FixVerdict, Nanos, Odometry, ResetReason, Restore, Travel, WheelStatus,
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -23,7 +24,7 @@ use crate::settings::{EstimatorSettings, Filter, InitialPose};
 use crate::wheels::{self, elapsed};
 use fixes::{Rest, Ruling};
 use front::FrontCorrection;
-use fused::{Fused, Reading, Setup, Taken, Turned};
+use fused::{Fused, Setup};
 use gyro::GyroIntegral;
 use increment::{Estimate, Increment};
 use model::{Aids, Model};
@@ -34,9 +35,6 @@ use twist::Twist;
 /// off by so much \[s\], before the pose counts as lost.
 const GAP_MARGIN: f64 = 5.0;
 const GAP_SLACK: f64 = 0.1;
-
-/// So long the fused filter awaits a wheel \[s\] before it goes on without.
-const LONGEST_AWAITING: f64 = 0.3;
 
 /// What the estimator takes in a step.
 #[derive(Clone, Copy, Debug)]
@@ -57,15 +55,22 @@ pub struct EstimatorInputs<'a> {
 /// Increments are differences of cumulative travel between what was read and what the pose stands
 /// for, so a lost sample or an unread wheel loses nothing: its motion comes with the next reading.
 /// While one wheel of the model is awaited the pose waits, and the covariance published meanwhile
-/// contains what the other wheels say has been rolled. An increment over a gap is one arc, its
+/// contains what the other wheels say has been rolled; the fused filter goes on without it after
+/// 0.3 s, where the others tell the motion. An increment over a gap is one arc, its
 /// covariance enlarged by how far a path of the vehicle's largest curvature can leave it.
 ///
 /// # The pose's fate
 /// Without an initial pose it is relative to the start (`Unset`). A fix at standstill makes it
-/// `Valid`. A new counter epoch, or a gap over which no wheel can have turned so far, makes a valid
-/// pose `Lost`; it goes on from where it was, without a jump, until a fix comes. [`Restore`] is
-/// taken up once, if this life has no pose from a fix: its pose plus what rolled by since; from
-/// another counter epoch it is lost.
+/// `Valid`; the fused filter then takes further fixes in motion as well, each at its own time, late
+/// and out of order as far back as the last 512 readings in which a wheel turned, and refuses what
+/// its gate refuses. A fix that contradicts the pose of a vehicle that stands sets it. A new counter
+/// epoch, or a gap over which no wheel can have turned so far, makes a valid pose `Lost`; it goes on
+/// from where it was, without a jump, until a fix comes. [`Restore`] is taken up once, if this life
+/// has no pose from a fix: its pose plus what rolled by since; from another counter epoch it is
+/// lost.
+///
+/// What the fused filter had learnt of the parameters is not restored: it begins with the prior and
+/// twice the covariance of the pose, which bounds what both had in common.
 ///
 /// A life that is to be restored must not be given an initial pose: that would be published as
 /// valid until the restore arrives.
@@ -201,6 +206,12 @@ impl Estimator {
         self.seen = travel.header.stamp;
         self.take_fix(inputs.fix, travel.header.stamp);
         self.write(travel, gap, out);
+    }
+
+    /// What the fused filter has learnt of the vehicle's parameters; none for other filters.
+    #[must_use]
+    pub fn parameters(&self) -> Option<ParameterEstimate> {
+        self.fused.as_ref().map(Fused::parameters)
     }
 
     /// Another counter epoch: what rolled by since the last travel is not known.
@@ -345,64 +356,6 @@ impl Estimator {
         self.applied(stamp, piece.distance, piece.turn);
     }
 
-    /// A wheel was awaited for so long that the fused filter goes on with the others.
-    fn goes_without(&mut self, stamp: Nanos) -> bool {
-        let since = *self.awaiting.get_or_insert(stamp);
-        self.fused.is_some()
-            && self.wheels.telling().contains(&true)
-            && (elapsed(stamp, since) > LONGEST_AWAITING || self.wheels.ready_without_lost())
-    }
-
-    /// The same with the fused filter.
-    fn fuse(&mut self, travel: &Travel) {
-        let stamp = travel.header.stamp;
-        let reading = self.reading(stamp);
-        let Some(fused) = &mut self.fused else { return };
-        let Some(piece) = fused.step(&reading) else {
-            self.unusable = self.unusable.wrapping_add(1);
-            return;
-        };
-        self.estimate = fused.estimate();
-        self.gap_pending = false;
-        if reading.moves() {
-            self.gyro.clear();
-        }
-        self.distance += piece.distance.abs();
-        self.applied(stamp, piece.distance, piece.turn);
-    }
-
-    fn reading(&self, stamp: Nanos) -> Reading {
-        let read = self.wheels.telling();
-        let turned = self.gyro.turn().filter(|_| self.uses_gyro).map(|(turn, variance)| {
-            let time = self.gyro.time();
-            let held = self.gyro.rate_variance() * time * time;
-            Turned { turn, variance: variance.max(held), time }
-        });
-        let start = if self.wheels.ready() { self.seen.max(self.rolled) } else { self.rolled };
-        Reading {
-            start: start.min(stamp),
-            end: stamp,
-            travel: core::array::from_fn(|wheel| {
-                if read[wheel] { self.wheels.unapplied(wheel) } else { 0.0 }
-            }),
-            read,
-            begun: self.wheels.beginning(),
-            aligned: self.wheels.aligned(),
-            turned,
-            gap: self.gap_pending.then_some(self.curvature),
-        }
-    }
-
-    /// A vehicle that stands does not turn: what the gyro reads is its bias.
-    fn rest(&mut self, travel: &Travel) {
-        self.gyro.clear();
-        if let Some(fused) = self.fused.as_mut().filter(|_| self.uses_gyro) {
-            if travel.yaw_rate_is_new == 1 {
-                fused.rest(travel.yaw_rate, self.gyro.rate_variance());
-            }
-        }
-    }
-
     fn applied(&mut self, stamp: Nanos, distance: f64, turn: f64) {
         self.wheels.apply();
         self.awaiting = None;
@@ -453,22 +406,6 @@ impl Estimator {
         }
     }
 
-    /// The fused filter corrects a valid pose by a fix, in motion as well. A fix that contradicts
-    /// it, and one without a pose to correct, sets the pose of a vehicle that stands.
-    fn corrected(&mut self, fix: &Fix, ruled: FixVerdict) -> FixVerdict {
-        let judged = matches!(ruled, FixVerdict::Accepted | FixVerdict::Moving);
-        let valid = self.state == EstimatorState::Valid;
-        let taken = self.fused.as_mut().filter(|_| judged && valid).map(|fused| fused.fix(fix));
-        if let (Some(Taken::Corrected), Some(fused)) = (taken, &self.fused) {
-            self.estimate = fused.estimate();
-            return FixVerdict::Accepted;
-        }
-        if ruled == FixVerdict::Accepted {
-            self.accept(fix);
-        }
-        ruled
-    }
-
     fn accept(&mut self, fix: &Fix) {
         let estimate = Estimate {
             pose: Pose::new(fix.x, fix.y, fix.yaw),
@@ -477,101 +414,6 @@ impl Estimator {
         self.jump(estimate, EstimatorState::Valid, ResetReason::Fix);
         self.wheels.apply();
         self.restorable = false;
-    }
-
-    /// The covariance to publish: while a wheel is awaited, with what the others say has been
-    /// rolled.
-    fn published_covariance(&self) -> Matrix3<f64> {
-        let awaiting = self.wheels.awaiting();
-        if awaiting == 0.0 {
-            return self.estimate.covariance;
-        }
-        let yaw = self.curvature * awaiting;
-        let unknown = Vector3::new(awaiting, awaiting, yaw).map(|deviation| deviation * deviation);
-        self.estimate.covariance + Matrix3::from_diagonal(&unknown)
-    }
-
-    /// What the filter says of itself.
-    fn record(&self) -> fused::Statistics {
-        if let Some(fused) = &self.fused {
-            return *fused.statistics();
-        }
-        let front = self.front.as_ref().map(|front| *front.record()).unwrap_or_default();
-        fused::Statistics {
-            innovation: front.innovation,
-            test_ratio: front.test_ratio,
-            corrections: front.corrections,
-            gated: front.gated,
-            corrected: front.corrected,
-            ..fused::Statistics::default()
-        }
-    }
-
-    fn wheel_use(&self) -> [WheelUse; 4] {
-        if let Some(fused) = &self.fused {
-            return fused.uses();
-        }
-        let needed = self.model.needed();
-        core::array::from_fn(|wheel| match needed[wheel] || self.front.is_some() {
-            true => WheelUse::Used,
-            false => WheelUse::Unneeded,
-        })
-    }
-
-    /// What the fused filter has learnt of the vehicle's parameters; none for other filters.
-    #[must_use]
-    pub fn parameters(&self) -> Option<ParameterEstimate> {
-        self.fused.as_ref().map(Fused::parameters)
-    }
-
-    fn write(&self, travel: &Travel, gap: bool, out: &mut Odometry) {
-        let stamp = travel.header.stamp;
-        let standstill = self.standstill(stamp);
-        let (speed, yaw_rate) = if standstill { (0.0, 0.0) } else { self.twist.at(stamp) };
-        let record = self.record();
-        let mut covariance = [0.0; 9];
-        covariance.copy_from_slice(self.published_covariance().as_slice());
-        *out = Odometry {
-            header: Header { stamp, origin: travel.header.origin, ..out.header },
-            x: self.estimate.pose.x,
-            y: self.estimate.pose.y,
-            yaw: self.estimate.pose.yaw,
-            speed,
-            yaw_rate,
-            steering: self.steering.unwrap_or(0.0),
-            covariance,
-            innovation: record.innovation,
-            test_ratio: record.test_ratio,
-            wheel_ratio: record.wheel_ratio,
-            block_ratio: record.block_ratio,
-            distance: self.distance,
-            travel: self.wheels.applied(),
-            counter_epoch: travel.counter_epoch,
-            resets: self.resets,
-            corrections: record.corrections,
-            gated: record.gated,
-            unusable: self.unusable,
-            state: self.state.code(),
-            model: self.model.kind().code(),
-            reset_reason: self.reason.code(),
-            fix_verdict: self.verdict.code(),
-            standstill: u8::from(standstill),
-            corrected: u8::from(record.corrected),
-            gap: u8::from(gap),
-            filter: filter_kind(self.settings.filter).code(),
-            wheel_use: self.wheel_use().map(WheelUse::code),
-            fix_sequence: self.fix_sequence,
-            ..Odometry::default()
-        };
-    }
-}
-
-fn filter_kind(filter: Filter) -> FilterKind {
-    match filter {
-        Filter::Rear => FilterKind::Rear,
-        Filter::Paper => FilterKind::Paper,
-        Filter::PaperOwn => FilterKind::PaperOwn,
-        Filter::Fused => FilterKind::Fused,
     }
 }
 

@@ -2,12 +2,40 @@
 
 use core::f64::consts::PI;
 
+use kerbside_odometry::Filter;
+
 use super::StackDraft;
-use crate::declare::{Kind, Range, Schema};
+use crate::declare::{Field, Kind, Range, Schema, Value};
 
 const SHARE: Kind = Kind::number(Range::above(0.0).to(1.0));
 const LENGTH: Kind = Kind::metres(Range::above(0.0).to(100.0));
 const ANGLE: Kind = Kind::radians(Range::above(0.0).to(PI));
+
+/// The filters that files may name. The paper's other reading is for comparisons alone.
+const FILTERS: &[&str] = &["rear", "paper", "fused"];
+
+impl Field for Filter {
+    fn take(value: &Value) -> Option<Self> {
+        match value {
+            Value::Text(text) => match text.as_str() {
+                "rear" => Some(Self::Rear),
+                "paper" => Some(Self::Paper),
+                "fused" => Some(Self::Fused),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    fn show(&self) -> Option<Value> {
+        let name = match self {
+            Self::Rear => "rear",
+            Self::Paper | Self::PaperOwn => "paper",
+            Self::Fused => "fused",
+        };
+        Some(Value::Text(name.to_owned()))
+    }
+}
 
 /// `[ingest]`, `[estimator]`, `[initial_pose]`, `[planner]` and `[tracker]`.
 pub(super) fn declare(schema: Schema<StackDraft>) -> Schema<StackDraft> {
@@ -49,6 +77,13 @@ fn declare_ingest(schema: Schema<StackDraft>) -> Schema<StackDraft> {
 fn declare_estimator(schema: Schema<StackDraft>) -> Schema<StackDraft> {
     schema
         .section("estimator", "From travel to a pose.")
+        .key(
+            "estimator.filter",
+            Kind::Choice(FILTERS),
+            "One axle alone, the paper's filter as published, or every sensor weighed by its own \
+             noise.",
+            |s| &mut s.estimator.filter,
+        )
         .key(
             "estimator.wheel_noise",
             Kind::unit("m/sqrt(m)", Range::above(0.0).to(1.0)),

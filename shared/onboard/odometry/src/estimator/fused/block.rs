@@ -1,21 +1,23 @@
 //! A stretch of path after which the parameters learn from what the sensors disagree about.
 //!
-//! All rows of a stretch share two unknowns, distance and turn; what m rows say beyond these are m
-//! - 2 numbers that are free of the motion, and, since the motion was solved with the same weights,
-//! free of its error: a measurement of the parameters alone. It corrects the pose through the
-//! covariance that both have in common.
+//! All rows of a stretch share two unknowns, distance and turn. What they say beyond these is free
+//! of the motion and, since the motion was solved with the same weights, of its error: a
+//! measurement of the parameters alone. It corrects the pose through the covariance that both have
+//! in common.
 
 use kerbside_geometry::math;
-use nalgebra::SVector;
 
+use super::algebra::{Factor, Projected, System, dot};
 use super::joint::{Gradient, Joint, Values};
-use super::rows::{GYRO, Measures, ROWS, Row, STEERING};
+use super::rows::{Measures, ROWS, Row};
 use super::setup::Setup;
 use crate::estimator::increment::Increment;
-use crate::parameters::PARAMETERS;
 
 /// A shorter stretch, as a share of the block, says less than its counts hide.
 const SHORTEST: f64 = 0.3;
+
+/// What a wheel may be off per metre for reasons that are not modelled, before it is gated.
+const SLACK: f64 = 0.002;
 
 /// Linearisations of a stretch.
 const ITERATIONS: usize = 2;
@@ -27,10 +29,10 @@ pub(crate) struct Sum {
     live: bool,
     /// And part of every record's motion; else it is watched only.
     used: bool,
-    residual: f64,
+    pub(crate) residual: f64,
     /// The row, weighed by the way.
-    of: [f64; 2],
-    by_parameters: [(usize, f64); 3],
+    pub(crate) of: [f64; 2],
+    pub(crate) by_parameters: [(usize, f64); 3],
     variance: f64,
     reading: f64,
 }
@@ -49,7 +51,8 @@ pub(crate) struct Block {
     chain: u32,
 }
 
-/// What a stretch said.
+/// What a stretch said. Only wheels are named: the steering and gyro rows break ties between
+/// them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Verdict {
     /// Squared innovation over its variance, per wheel; zero where nothing else tells.
@@ -65,16 +68,6 @@ pub(crate) struct Verdict {
     /// Square sum of what the rows say beyond the motion, and how many numbers these are.
     pub(crate) square: f64,
     pub(crate) freedom: u8,
-}
-
-/// The rows of a stretch without the motion: unit variance, independent.
-#[derive(Clone, Copy, Debug, Default)]
-struct Projected {
-    count: usize,
-    residual: [f64; ROWS],
-    by_parameters: [Values; ROWS],
-    /// What a unit of each sensor's reading does.
-    by_reading: [[f64; ROWS]; ROWS],
 }
 
 impl Block {
@@ -148,7 +141,9 @@ impl Block {
         let before = joint.deviation;
         let mut trial = *joint;
         for iteration in 1..=ITERATIONS {
-            let rows = self.project(setup, &before, &(trial.deviation - before), None);
+            let variances = core::array::from_fn(|row| self.variance(setup, row));
+            let change = trial.deviation - before;
+            let rows = self.project(setup, &before, &change, &variances, None);
             trial = *joint;
             for index in 0..rows.count {
                 let gradient = Gradient {
@@ -170,7 +165,7 @@ impl Block {
     /// Test ratio of each wheel: what its reading is off from all else, over the variance of that.
     fn judge(&self, setup: &Setup, joint: &Joint) -> Verdict {
         let mut verdict = Verdict::default();
-        let rows = self.project(setup, &joint.deviation, &Values::zeros(), None);
+        let rows = self.judged(setup, joint, None);
         let Some(factor) = Factor::new(&rows, joint) else { return verdict };
         let residual = factor.solve(&rows.residual);
         verdict.square = dot(&residual, &residual);
@@ -183,7 +178,7 @@ impl Block {
         });
         verdict.suspect = (verdict.ratios[worst] > setup.wheel_gate).then_some(worst);
         for wheel in (0..4).filter(|wheel| self.sums[*wheel].live && !self.sums[*wheel].used) {
-            let rows = self.project(setup, &joint.deviation, &Values::zeros(), Some(wheel));
+            let rows = self.judged(setup, joint, Some(wheel));
             if let Some(factor) = Factor::new(&rows, joint) {
                 self.test(setup, wheel, &rows, &factor, &mut verdict);
             }
@@ -202,16 +197,31 @@ impl Block {
         let by_reading: [f64; ROWS] = core::array::from_fn(|row| rows.by_reading[row][wheel]);
         let own = factor.solve(&by_reading);
         let leverage = dot(&own, &own);
-        if leverage > 1e-6 / self.variance(setup, wheel) {
+        if leverage > 1e-6 / self.spread(setup, wheel) {
             let residual = factor.solve(&rows.residual);
             verdict.ratios[wheel] = dot(&own, &residual).powi(2) / leverage;
             verdict.tested[wheel] = true;
         }
     }
 
-    /// What a count hides at the end of a stretch, it shows at the beginning of the next: over n
-    /// stretches in a row counts add q^2/6 to the sum once, not n times. A share of 1/n for the n-th
-    /// adds a little more than that.
+    /// The rows as the gate sees them.
+    fn judged(&self, setup: &Setup, joint: &Joint, watched: Option<usize>) -> Projected {
+        let variances = core::array::from_fn(|row| self.spread(setup, row));
+        self.project(setup, &joint.deviation, &Values::zeros(), &variances, watched)
+    }
+
+    /// Variance of a row, for the gate.
+    fn spread(&self, setup: &Setup, row: usize) -> f64 {
+        if row >= 4 {
+            return self.sums[row].variance;
+        }
+        let slack = SLACK * self.way;
+        self.sums[row].variance + setup.quantisation[row] + slack * slack
+    }
+
+    /// Variance of a row, for learning. What a count hides at the end of a stretch, it shows at the
+    /// beginning of the next: over n stretches in a row counts add q^2/6 to the sum once, not n
+    /// times. A share of 1/n for the n-th adds a little more than that.
     fn variance(&self, setup: &Setup, row: usize) -> f64 {
         let share = 1.0 / f64::from(self.chain.saturating_add(1));
         let counted = if row < 4 { share * setup.quantisation[row] } else { 0.0 };
@@ -226,11 +236,11 @@ impl Block {
         setup: &Setup,
         deviation: &Values,
         change: &Values,
+        variances: &[f64; ROWS],
         watched: Option<usize>,
     ) -> Projected {
         let mut system = System::default();
-        for index in 0..ROWS {
-            let variance = self.variance(setup, index);
+        for (index, &variance) in variances.iter().enumerate() {
             let taken = self.sums[index].used || watched == Some(index);
             if taken && variance > 0.0 {
                 let sum = if index < 2 && !setup.steered {
@@ -282,131 +292,3 @@ impl Sum {
         }
     }
 }
-
-/// The whitened rows.
-#[derive(Clone, Copy, Debug, Default)]
-struct System {
-    count: usize,
-    of: [[f64; 2]; ROWS],
-    rows: Projected,
-}
-
-impl System {
-    fn push(&mut self, sum: &Sum, sensor: usize, way: f64, weight: f64) {
-        let at = self.count;
-        self.of[at] = sum.of.map(|entry| entry / way * weight);
-        self.rows.residual[at] = sum.residual * weight;
-        for (parameter, slope) in sum.by_parameters {
-            self.rows.by_parameters[at][parameter] += slope * weight;
-        }
-        self.rows.by_reading[at][sensor] = weight;
-        self.count += 1;
-    }
-
-    fn reduce(mut self) -> Projected {
-        if self.count < 2 {
-            return Projected::default();
-        }
-        self.reflect(0);
-        self.reflect(1);
-        let mut rows = self.rows;
-        rows.count = self.count - 2;
-        rows.residual.copy_within(2.., 0);
-        rows.by_parameters.copy_within(2.., 0);
-        rows.by_reading.copy_within(2.., 0);
-        rows
-    }
-
-    /// Clears column `column` below the diagonal.
-    fn reflect(&mut self, column: usize) {
-        let mut mirror = [0.0; ROWS];
-        for (row, entry) in mirror.iter_mut().enumerate().take(self.count).skip(column) {
-            *entry = self.of[row][column];
-        }
-        let length = dot(&mirror, &mirror).sqrt();
-        mirror[column] += length.copysign(mirror[column]);
-        let square = dot(&mirror, &mirror);
-        if square <= 0.0 {
-            return;
-        }
-        let factor = 2.0 / square;
-        for other in 0..2 {
-            let entries = core::array::from_fn(|row| self.of[row][other]);
-            let share = factor * dot(&mirror, &entries);
-            (0..ROWS).for_each(|row| self.of[row][other] -= share * mirror[row]);
-        }
-        let share = factor * dot(&mirror, &self.rows.residual);
-        (0..ROWS).for_each(|row| self.rows.residual[row] -= share * mirror[row]);
-        self.reflect_rest(&mirror, factor);
-    }
-
-    fn reflect_rest(&mut self, mirror: &[f64; ROWS], factor: f64) {
-        let mut parameters = Values::zeros();
-        let mut readings = [0.0; ROWS];
-        for row in 0..self.count {
-            parameters += self.rows.by_parameters[row] * mirror[row];
-            (0..ROWS).for_each(|sensor| {
-                readings[sensor] += self.rows.by_reading[row][sensor] * mirror[row];
-            });
-        }
-        for row in 0..self.count {
-            let share = factor * mirror[row];
-            self.rows.by_parameters[row] -= parameters * share;
-            (0..ROWS).for_each(|sensor| {
-                self.rows.by_reading[row][sensor] -= readings[sensor] * share;
-            });
-        }
-    }
-}
-
-/// Cholesky factor of the projected rows' covariance, parameters included.
-struct Factor {
-    count: usize,
-    lower: [[f64; ROWS]; ROWS],
-}
-
-impl Factor {
-    fn new(rows: &Projected, joint: &Joint) -> Option<Self> {
-        let mut lower = [[0.0; ROWS]; ROWS];
-        for row in 0..rows.count {
-            let spread: SVector<f64, PARAMETERS> = joint.covariance() * rows.by_parameters[row];
-            for column in row..rows.count {
-                let unit = if row == column { 1.0 } else { 0.0 };
-                lower[column][row] = unit + rows.by_parameters[column].dot(&spread);
-            }
-        }
-        for column in 0..rows.count {
-            for row in column..rows.count {
-                let mut entry = lower[row][column];
-                (0..column).for_each(|inner| entry -= lower[row][inner] * lower[column][inner]);
-                if row == column {
-                    if entry.is_nan() || entry <= 0.0 {
-                        return None;
-                    }
-                    lower[row][column] = entry.sqrt();
-                } else {
-                    lower[row][column] = entry / lower[column][column];
-                }
-            }
-        }
-        Some(Self { count: rows.count, lower })
-    }
-
-    /// The inverse of the factor times `right`.
-    fn solve(&self, right: &[f64; ROWS]) -> [f64; ROWS] {
-        let mut solution = [0.0; ROWS];
-        for row in 0..self.count {
-            let mut entry = right[row];
-            (0..row).for_each(|inner| entry -= self.lower[row][inner] * solution[inner]);
-            solution[row] = entry / self.lower[row][row];
-        }
-        solution
-    }
-}
-
-fn dot(left: &[f64; ROWS], right: &[f64; ROWS]) -> f64 {
-    left.iter().zip(right).map(|(left, right)| left * right).sum()
-}
-
-// The steering and gyro rows are never named: they break ties between the wheels.
-const _: () = assert!(STEERING >= 4 && GYRO >= 4);

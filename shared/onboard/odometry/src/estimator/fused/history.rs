@@ -53,10 +53,6 @@ impl History {
         self.fix_count = 0;
     }
 
-    pub(crate) fn next(&self) -> u64 {
-        self.next
-    }
-
     /// Number of the oldest record that is kept.
     pub(crate) fn oldest(&self) -> u64 {
         self.first.max(self.next.saturating_sub(RECORDS as u64))
@@ -97,7 +93,7 @@ impl History {
     }
 
     fn keep(&mut self, number: u64, state: &State) {
-        if number % STRIDE == 0 || number == self.first {
+        if number.is_multiple_of(STRIDE) || number == self.first {
             self.states[slot(number / STRIDE, STATES)] = Kept { number, state: *state };
         }
     }

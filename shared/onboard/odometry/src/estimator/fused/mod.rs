@@ -8,6 +8,7 @@
 //! wheel that contradicts the others is left out of its block, an axle that slips of the window in
 //! which it does: the newest past is kept and gone through again. So are late fixes.
 
+mod algebra;
 mod axles;
 mod block;
 mod fix;

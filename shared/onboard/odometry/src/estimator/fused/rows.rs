@@ -105,7 +105,7 @@ impl Measures {
     /// about the wheel's direction: what a wrong direction does is of second order.
     pub(crate) fn wheel(&self, wheel: usize, travel: f64, centre: (f64, f64), noise: f64) -> Row {
         let y = self.lateral[wheel];
-        let half = 0.5_f64.copysign(if wheel % 2 == 0 { 1.0 } else { -1.0 });
+        let half = 0.5_f64.copysign(if wheel.is_multiple_of(2) { 1.0 } else { -1.0 });
         let reading = travel * self.scale[wheel];
         let own = (wheel, -travel);
         if wheel >= 2 {

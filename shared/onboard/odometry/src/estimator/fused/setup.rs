@@ -11,6 +11,9 @@ use crate::wheels::WheelScale;
 /// Blocks after which the parameters learn, as a share of the wheelbase: 50 mm for the 1:6 car.
 const BLOCK: f64 = 0.1;
 
+/// And at least so many counts.
+const COUNTS: f64 = 20.0;
+
 /// Way after which a parameter is as uncertain as its prior says by change alone: tyres wear, loads
 /// and pressures change \[m\].
 const MEMORY: f64 = 1e5;
@@ -62,6 +65,7 @@ impl Setup {
         prior: &ParameterPrior,
         scales: &[WheelScale; 4],
     ) -> Self {
+        let coarsest = scales.iter().fold(0.0_f64, |most, scale| most.max(scale.metres_per_count));
         let noise = wheel_noise(vehicle, settings, prior);
         let steering =
             vehicle.steering_sensor.map_or(settings.steering_noise, |sensor| sensor.noise);
@@ -79,7 +83,7 @@ impl Setup {
             steering_variance: (steering * steering).max(LEAST_VARIANCE),
             steered: sensors.steering,
             wheels: sensors.wheels,
-            block: BLOCK * vehicle.wheelbase,
+            block: (BLOCK * vehicle.wheelbase).max(COUNTS * coarsest),
             wheel_gate: WHEEL_GATE * settings.gate,
             gate: settings.gate,
             drift,
