@@ -181,7 +181,7 @@ fn diagnose_run(found: &mut Findings, run: &Run, vehicle: &Vehicle, noise: &Nois
     if !found.list.is_empty() {
         return None;
     }
-    reference::check_units(found, run, &grid, vehicle);
+    reference::check_units(found, run, &grid, vehicle, noise);
     if !found.list.is_empty() {
         return None;
     }

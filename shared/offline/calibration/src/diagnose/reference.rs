@@ -26,7 +26,13 @@ const UNITS: [(&str, f64); 5] = [
 ];
 
 /// Positions that are not in metres; heading and steering that are not in radians.
-pub(crate) fn check_units(found: &mut Findings, run: &Run, grid: &Grid, vehicle: &Vehicle) {
+pub(crate) fn check_units(
+    found: &mut Findings,
+    run: &Run,
+    grid: &Grid,
+    vehicle: &Vehicle,
+    noise: &Noise,
+) {
     let largest = |values: &[f64]| values.iter().map(|value| value.abs()).fold(0.0, f64::max);
     if let Some(steering) = &run.steering
         && largest(&steering.value) > LARGEST_STEERING
@@ -45,16 +51,19 @@ pub(crate) fn check_units(found: &mut Findings, run: &Run, grid: &Grid, vehicle:
         );
         found.forbid(Problem::YawUnit, evidence);
     }
-    check_scale(found, run, grid, vehicle);
+    check_scale(found, run, grid, vehicle, noise);
 }
 
-fn check_scale(found: &mut Findings, run: &Run, grid: &Grid, vehicle: &Vehicle) {
-    let (mut read, mut rolled) = (0.0, 0.0);
-    for chord in chords(run, grid, vehicle.wheelbase).iter().filter(|chord| chord.is_plain()) {
+fn check_scale(found: &mut Findings, run: &Run, grid: &Grid, vehicle: &Vehicle, noise: &Noise) {
+    let (mut read, mut rolled, mut count) = (0.0, 0.0, 0.0);
+    let least = vehicle.wheelbase.max(10.0 * noise.position);
+    for chord in chords(run, grid, least).iter().filter(|chord| chord.is_plain()) {
         read += chord.length;
         rolled += chord.by_wheels();
+        count += 1.0;
     }
-    if rolled < vehicle.wheelbase {
+    let chance = 6.0 * (2.0 * f64::max(count, 1.0)).sqrt() * noise.position;
+    if rolled < vehicle.wheelbase || (read - rolled).abs() < chance {
         return;
     }
     let ratio = read / rolled;

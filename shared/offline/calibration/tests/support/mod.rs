@@ -271,18 +271,34 @@ pub struct Errors {
     sum: [f64; 9],
     squares: [f64; 9],
     covered: [f64; 9],
+    worst: [f64; 9],
+    worst_epsilon: [f64; 2],
 }
 
 impl Errors {
     /// Adds an estimate and the standard deviations that it states.
     pub fn add(&mut self, found: &Parameters, truth: &Parameters, deviations: &Vector) {
         self.count += 1.0;
+        for (worst, front) in self.worst_epsilon.iter_mut().zip([true, false]) {
+            *worst = worst.max((found.epsilon(front) - truth.epsilon(front)).abs());
+        }
         for i in 0..9 {
             let error = found.values[i] - truth.values[i];
             self.sum[i] += error;
+            self.worst[i] = self.worst[i].max(error.abs());
             self.squares[i] += error * error;
             self.covered[i] += f64::from(u8::from(error.abs() <= 1.96 * deviations[i]));
         }
+    }
+
+    /// Largest error.
+    pub fn worst(&self, i: usize) -> f64 {
+        self.worst[i]
+    }
+
+    /// Largest error of the front and of the rear epsilon \[m\].
+    pub fn worst_epsilon(&self) -> [f64; 2] {
+        self.worst_epsilon
     }
 
     pub fn bias(&self, i: usize) -> f64 {
