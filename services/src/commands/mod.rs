@@ -12,9 +12,11 @@ use clap::{Parser, Subcommand};
 use kerbside_messages::Process;
 use kerbside_runtime::Instance;
 
+use crate::compare::CompareVerb;
 use crate::exit::{Exit, Failure};
 use crate::park::ParkArgs;
 use crate::replay::ReplayArgs;
+use crate::reproduce::ReproduceArgs;
 use crate::service::{Service, ServiceArgs};
 use crate::vehicle::VehicleArgs;
 use crate::{
@@ -69,6 +71,12 @@ enum Verb {
     /// Feed recorded readings through ingest and estimator, and say how far the odometry drifts.
     #[command(after_help = "Example: kerbside replay tests/data/cases/paper-1-6 --speed 10")]
     Replay(ReplayArgs),
+    /// Repeat the paper's experiments on the proving ground, and hold them against what they are to show.
+    #[command(after_help = "Example: kerbside reproduce --trials 400 --out /tmp/paper")]
+    Reproduce(ReproduceArgs),
+    /// Compare ways of doing the same, side by side.
+    #[command(subcommand, after_help = "Example: kerbside compare filters --trials 100")]
+    Compare(CompareVerb),
     /// Check, show or explain the configuration.
     #[command(subcommand, after_help = "Example: kerbside config check")]
     Config(config::ConfigVerb),
@@ -131,6 +139,14 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             let level = level.unwrap_or("warn");
             logging::start("replay", level, false);
             crate::replay::run(&ReplayArgs { log: Some(level.to_owned()), ..args.clone() })
+        }
+        Verb::Reproduce(args) => {
+            logging::start("reproduce", level.unwrap_or("warn"), false);
+            crate::reproduce::run(args)
+        }
+        Verb::Compare(verb) => {
+            logging::start("compare", level.unwrap_or("warn"), false);
+            crate::compare::run(verb)
         }
         Verb::Up(args) => up::run(args, level),
         Verb::Service(verb) => serve(verb, level),

@@ -6,9 +6,10 @@ use kerbside_calibration::{
 };
 use kerbside_geometry::{Pose, Vehicle, angle};
 use kerbside_odometry::ParameterPrior;
-use kerbside_proving_ground::{Driven, Physics, Reference};
+use kerbside_proving_ground::{Driven, Physics, Reference, Residuals};
 use nalgebra::{SMatrix, SVector};
 
+use crate::belief::deviations;
 use crate::error::ReproductionError;
 use crate::follower::Belief;
 use crate::progress::Progress;
@@ -179,6 +180,16 @@ impl Told {
             root: root.ok_or(kerbside_calibration::CalibrationError::Diverged)?,
             prior: prior(&calibrated, yard),
         })
+    }
+
+    /// The same, the filter allowing besides for the residual errors of an ordinary calibration (digest section 4.4), as
+    /// it does where a vehicle's file says nothing.
+    pub(crate) fn with_allowance(mut self) -> Self {
+        let deviations = deviations(&Residuals::paper());
+        for (i, deviation) in deviations.into_iter().enumerate() {
+            self.prior.covariance[(i, i)] += deviation * deviation;
+        }
+        self
     }
 
     /// Calibrates with the readings of `driven` and the beliefs of `believed`.

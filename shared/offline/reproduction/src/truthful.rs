@@ -139,7 +139,7 @@ pub(crate) fn growth(
 /// How many kinds of path [`growth`] drives.
 pub(crate) const KINDS: usize = 5;
 /// How many circumstances [`circumstances`] drives.
-pub(crate) const CIRCUMSTANCES: usize = 5 + SPEEDS.len() * STRENGTHS.len();
+pub(crate) const CIRCUMSTANCES: usize = 6 + SPEEDS.len() * STRENGTHS.len();
 
 /// Sensors of which one encoder fails.
 fn failing(wheel: Wheel, failure: Failure) -> Sensors {
@@ -196,6 +196,7 @@ pub(crate) fn circumstances(
     progress: &mut Progress<'_>,
 ) -> Result<Vec<Circumstance>, ReproductionError> {
     let mut rows = failures(trials, seed, progress)?;
+    let mut allowed = None;
     for (number, strength) in STRENGTHS.into_iter().enumerate() {
         let case = 600 + number as u64;
         let told = Told::by(&Circumstances::physical(strength, case).yard, seed_of(seed, case, 0))?;
@@ -203,8 +204,16 @@ pub(crate) fn circumstances(
             let asked = (trials, seed);
             rows.push(with_physics(strength, speed, &told, asked, progress)?);
         }
+        if strength >= 1.0 {
+            let told = told.with_allowance();
+            let mut row = with_physics(strength, SPEEDS[0], &told, (trials, seed), progress)?;
+            row.name.push_str(", ordinary allowance");
+            row.accept = Accept::Shown;
+            allowed = Some(row);
+        }
     }
     excuse(&mut rows);
+    rows.extend(allowed);
     Ok(rows)
 }
 
