@@ -13,9 +13,11 @@ use kerbside_messages::Process;
 use kerbside_runtime::Instance;
 
 use crate::calibrate::CalibrateArgs;
+use crate::compare::CompareVerb;
 use crate::exit::{Exit, Failure};
 use crate::park::ParkArgs;
 use crate::replay::ReplayArgs;
+use crate::reproduce::ReproduceArgs;
 use crate::service::{Service, ServiceArgs};
 use crate::vehicle::VehicleArgs;
 use crate::{
@@ -73,6 +75,12 @@ enum Verb {
     /// Identify radii, tracks, wheelbase and steering offset from recorded runs, and write them down.
     #[command(after_help = "Example: kerbside calibrate CASE --leave-out straight-5,circle-5")]
     Calibrate(CalibrateArgs),
+    /// Repeat the paper's experiments on the proving ground, and hold them against what they are to show.
+    #[command(after_help = "Example: kerbside reproduce --trials 400 --out /tmp/paper")]
+    Reproduce(ReproduceArgs),
+    /// Compare ways of doing the same, side by side.
+    #[command(subcommand, after_help = "Example: kerbside compare filters --trials 100")]
+    Compare(CompareVerb),
     /// Check, show or explain the configuration.
     #[command(subcommand, after_help = "Example: kerbside config check")]
     Config(config::ConfigVerb),
@@ -139,6 +147,14 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
         Verb::Calibrate(args) => {
             logging::start("calibrate", level.unwrap_or("warn"), false);
             crate::calibrate::run(args)
+        }
+        Verb::Reproduce(args) => {
+            logging::start("reproduce", level.unwrap_or("warn"), false);
+            crate::reproduce::run(args)
+        }
+        Verb::Compare(verb) => {
+            logging::start("compare", level.unwrap_or("warn"), false);
+            crate::compare::run(verb)
         }
         Verb::Up(args) => up::run(args, level),
         Verb::Service(verb) => serve(verb, level),

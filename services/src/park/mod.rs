@@ -170,6 +170,14 @@ fn run_one(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Finished, Failur
     Ok(Finished { job, run, verdict, report })
 }
 
+/// Runs `job` as processes, without showing how far it is.
+///
+/// # Errors
+/// [`Failure`] where the stack cannot be started.
+pub fn run_live(job: &Job) -> Result<Run, Failure> {
+    live::run(job, &Progress::new(true))
+}
+
 /// The job that `args` describe for one seed.
 ///
 /// # Errors

@@ -2,6 +2,7 @@
 
 mod chain;
 mod comparison;
+mod filters;
 mod input;
 mod live;
 mod order;
@@ -12,6 +13,7 @@ mod summary;
 mod track;
 mod uptake;
 
+pub use filters::{FilterDrift, Filtered, by_filters};
 pub use input::{Described, Input, describe, find, only_source};
 pub use order::{Order, Place};
 pub use uptake::Uptaker;
