@@ -6,6 +6,7 @@ mod input;
 mod judge;
 mod output;
 mod report;
+mod split;
 mod summary;
 
 use std::io::IsTerminal;
@@ -35,6 +36,9 @@ pub struct CalibrateArgs {
     /// Leave these runs out of the fit, and judge the result on them; without it runs take turns.
     #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     pub leave_out: Vec<String>,
+    /// Cut each run at this share of its time: fit the beginnings, and judge the result on the ends.
+    #[arg(long, value_name = "SHARE", value_parser = split::parse_share, conflicts_with_all = ["runs", "leave_out"])]
+    pub split: Option<f64>,
     /// Identify the steering sensor's gain, too: it takes circles of at least two radii.
     #[arg(long)]
     pub free_gain: bool,
@@ -100,9 +104,12 @@ pub fn run(args: &CalibrateArgs) -> Result<Exit, Failure> {
 
 fn calibrated(args: &CalibrateArgs, progress: &ProgressBar) -> Result<Calibration, Failure> {
     progress.set_message("reading the runs");
-    let case = Case::read(&args.case)?;
+    let mut case = Case::read(&args.case)?;
+    let named = match args.split {
+        Some(share) => Some(split_runs(&mut case, share)),
+        None => left_out_by_name(args, &case.runs)?,
+    };
     let vehicle = case.vehicle();
-    let named = left_out_by_name(args, &case.runs)?;
     let is_out = |run: &&Run| named.as_ref().is_some_and(|named| named.contains(&run.name));
     let (out, fitted): (Vec<&Run>, Vec<&Run>) = case.runs.iter().partition(is_out);
     let fitted: Vec<Run> = fitted.into_iter().cloned().collect();
@@ -141,6 +148,22 @@ fn calibrated(args: &CalibrateArgs, progress: &ProgressBar) -> Result<Calibratio
         calibration.vehicle = Some(path);
     }
     Ok(calibration)
+}
+
+/// Cuts each run in two; the names of the ends.
+fn split_runs(case: &mut Case, share: f64) -> Vec<String> {
+    let runs = std::mem::take(&mut case.runs);
+    let mut ends = Vec::new();
+    for run in runs {
+        match split::split(&run, share) {
+            Some([begin, end]) => {
+                ends.push(end.name.clone());
+                case.runs.extend([begin, end]);
+            }
+            None => case.runs.push(run),
+        }
+    }
+    ends
 }
 
 /// The runs that are not to be fitted; none where nobody named any.
@@ -208,6 +231,7 @@ fn command_line(args: &CalibrateArgs) -> String {
     words.extend(
         (!args.leave_out.is_empty()).then(|| format!("--leave-out {}", args.leave_out.join(","))),
     );
+    words.extend(args.split.map(|share| format!("--split {share}")));
     words.extend(args.free_gain.then(|| "--free-gain".to_owned()));
     words.join(" ")
 }
