@@ -1,7 +1,7 @@
 //! `reproduce` and `compare filters` with few trials: what they print, their exit codes, the same bytes for the same seed.
 //! Neither starts a stack.
 
-#![allow(clippy::unwrap_used)] // Helpers of tests are tests.
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests are tests.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
