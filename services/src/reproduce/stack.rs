@@ -44,6 +44,7 @@ fn one_scene(
         mode: mode.to_owned(),
         ends: Vec::new(),
         parked: 0,
+        causes: Vec::new(),
     };
     let args = ParkArgs {
         scenario: scene.to_owned(),
@@ -57,7 +58,7 @@ fn one_scene(
         out: None,
         headless: true,
         json: false,
-        log: None,
+        log: Some("warn".to_owned()),
     };
     for index in 0..runs {
         let seed = seed + u64::from(index);
@@ -73,6 +74,9 @@ fn one_scene(
         let verdict = park::judge::judge(&run.trace, &job.scenario, &job.service.vehicle, run.end);
         line.parked += usize::from(verdict.parked);
         line.ends.push(verdict.end_error);
+        if !verdict.parked {
+            line.causes.push(verdict.cause);
+        }
     }
     Ok(line)
 }

@@ -91,6 +91,7 @@ fn stack_as_json(line: &StackParking) -> Value {
         .map(|end| end.map(|pose| json!({ "x": pose.x, "y": pose.y, "yaw": pose.yaw })));
     json!({
         "scene": line.scene, "mode": line.mode, "parked": line.parked, "of": line.ends.len(),
+        "causes": line.causes,
         "ends": ends.collect::<Vec<_>>(),
     })
 }
@@ -117,13 +118,9 @@ fn print(report: &ReproductionReport, path: &Path) {
         println!("{}", not_reached(out));
     }
     for line in &report.stack {
-        println!(
-            "{}, the stack {}: {} of {} parked",
-            line.scene,
-            line.mode,
-            line.parked,
-            line.ends.len()
-        );
+        let (scene, mode, of) = (&line.scene, &line.mode, line.ends.len());
+        println!("{scene}, the stack {mode}: {} of {of} parked", line.parked);
+        line.causes.iter().for_each(|cause| println!("    {cause}"));
     }
     println!("{} trials per case, seed {}", out.asked.trials, out.asked.seed);
     println!("report  {}", path.display());

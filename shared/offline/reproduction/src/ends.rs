@@ -188,6 +188,7 @@ impl Ends {
         let allowed = Accept::AtMost(ALLOWED[group][self.case]);
         let mut figures =
             vec![Figure::new(6, name, "", ours, allowed).between(interval).beside("0.66")];
+        figures.push(self.blind_figure(allowed, group == 0));
         let better = [Contender::Rear, Contender::Front]
             .into_iter()
             .min_by(|a, b| self.variance(*a).total_cmp(&self.variance(*b)));
@@ -207,6 +208,14 @@ impl Ends {
             figures.push(Figure::new(6, name, "", ours, accept).between(interval).beside("0.66"));
         }
         figures
+    }
+
+    /// By the wheels alone, as the digest's figures for known parameters are; with residual errors it is shown beside.
+    fn blind_figure(&self, allowed: Accept, held: bool) -> Figure {
+        let (ours, interval) = self.variance_ratio(Contender::FusedBlind, Contender::Rear);
+        let name = format!("fused without steering/rear variance, {}", self.name());
+        let accept = if held { allowed } else { Accept::Shown };
+        Figure::new(6, name, "", ours, accept).between(interval).beside("0.66")
     }
 
     /// Row 7.

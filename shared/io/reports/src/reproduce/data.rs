@@ -27,4 +27,6 @@ pub struct StackParking {
     pub ends: Vec<Option<Pose>>,
     /// How many were judged to be parked.
     pub parked: usize,
+    /// Why the others were not, a sentence each.
+    pub causes: Vec<String>,
 }
