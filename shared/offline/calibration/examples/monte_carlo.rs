@@ -38,7 +38,7 @@ fn main() {
     }
 }
 
-/// The digest's table 3.3: arcs as (radius \[m\], turn \[rad\]), driven in turn.
+/// The cases: arcs as (radius \[m\], turn \[rad\]), driven in turn.
 fn bounds(label: &str, car: &Car) {
     let quarter = TAU / 4.0;
     let plans: [(&str, Vec<(f64, f64)>); 4] = [

@@ -21,7 +21,7 @@ pub struct WheelAngle {
 /// wheel's angle `steering` \[rad\], front track \[m\] and wheelbase \[m\]; regular for any angle.
 ///
 /// tan d = t/(1 -+ b t/(2L)), t = tan(steering): both wheels roll about the centre of rotation, which lies on the
-/// rear axle's line (digest of the paper, section 2a).
+/// rear axle's line (geometry of one centre of rotation).
 #[must_use]
 pub fn wheel_angle(steering: f64, side: f64, track: f64, wheelbase: f64) -> WheelAngle {
     let (s, c) = math::sin_cos(steering);

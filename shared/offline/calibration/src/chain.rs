@@ -1,7 +1,7 @@
 //! Dead reckoning of one run between what is known of its poses, with everything's dependence on the parameters.
 //!
 //! Wheel and steering noise are process noise, reference poses are measurements; the whitened innovations, taken
-//! from a true start pose that is unknown too, are the run's likelihood (errors in variables, digest section 3.3).
+//! from a true start pose that is unknown too, are the run's likelihood (errors in variables).
 
 use kerbside_geometry::{Pose, angle, math};
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector};

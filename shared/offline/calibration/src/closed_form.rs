@@ -3,7 +3,7 @@
 //! Straight, equations (7) to (12): (10) put into (12) says that each wheel rolls the run's length S, so R = S/sum of
 //! its rotation, and epsilon = left minus right radius. Arc, equation (13): b = (R_r sum Da - R_l sum Db)/theta. Both
 //! are exact for any curvature on the way. The front wheels' increments are turned by their own wheel angles first
-//! (digest section 2a, form b), which depend on the front track a little: the sum is iterated. Averages of epsilon over
+//! (form b), which depend on the front track a little: the sum is iterated. Averages of epsilon over
 //! samples instead of sums would be biased by the counts' variance; that a straight run is straight is assumed, and an
 //! error of the steering zero goes into epsilon in full: both are what the joint fit is for.
 

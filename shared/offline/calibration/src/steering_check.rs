@@ -11,7 +11,7 @@ const WINDOW: f64 = 1.0;
 /// A window in which the reading moves by more than this is not used \[rad\].
 const STEADY: f64 = 0.02;
 
-/// The sensor's reading as a line over the angle that the front wheels' travel implies (digest section 2a, form d):
+/// The sensor's reading as a line over the angle that the front wheels' travel implies (form d):
 /// reading = zero + gain * angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SteeringCheck {

@@ -179,6 +179,29 @@ fn a_turned_heading_and_other_units_are_named() {
 }
 
 #[test]
+fn a_closed_path_known_at_its_ends_alone_is_not_in_another_unit() {
+    // To the left and back to the right: it ends beside where it began, with hardly any turn in all.
+    let legs = [(0.6, 5.0), (-0.6, 5.0)];
+    let found = problems(car().drive("eight", "eight", &legs, 5), |run| {
+        let (first, last) = (run.reference[0], run.reference[run.reference.len() - 1]);
+        run.reference = vec![first, last];
+    });
+    assert!(!found.contains(&Problem::PositionUnit), "{found:?}");
+}
+
+#[test]
+fn a_wheel_that_tells_no_turn_accuses_no_reference() {
+    let mut run = car().drive("slalom", "slalom", &[(0.5, 20.0)], 6);
+    for wheel in [0, 1, 3] {
+        run.rotation[wheel] = None;
+    }
+    run.steering = None;
+    let found = findings(&[run]);
+    let wrong = [Problem::YawUnit, Problem::PositionUnit];
+    assert!(found.iter().all(|finding| !wrong.contains(&finding.problem)), "{found:?}");
+}
+
+#[test]
 fn another_clock_is_found_with_its_offset() {
     for offset in [0.4, -0.4, 1.5] {
         for run in [straight(), left(), slalom()] {

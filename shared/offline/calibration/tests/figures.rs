@@ -40,9 +40,9 @@ fn the_joint_fit_sits_on_the_bound_with_a_fine_reference() {
     car.truth.set(Parameter::SteeringZero, 0.2 * DEGREE);
     let (errors, bound) = joint_errors(&car, 4);
     assert_on_the_bound(&errors, &bound, 4.0);
-    // The digest's table: 15 um, 0.23 mm, 0.25 mm, 0.13 mm, 0.003 degrees.
-    let digest = [15e-6, 15e-6, 15e-6, 15e-6, 0.25e-3, 0.23e-3, 0.13e-3, 0.003 * DEGREE];
-    for (i, deviation) in digest.into_iter().enumerate() {
+    // Expected of such runs: 15 um, 0.23 mm, 0.25 mm, 0.13 mm, 0.003 degrees.
+    let expected = [15e-6, 15e-6, 15e-6, 15e-6, 0.25e-3, 0.23e-3, 0.13e-3, 0.003 * DEGREE];
+    for (i, deviation) in expected.into_iter().enumerate() {
         let ratio = bound.bound[i] / deviation;
         assert!((0.6..1.3).contains(&ratio), "parameter {i}: {ratio}");
     }
@@ -53,8 +53,8 @@ fn the_joint_fit_sits_on_the_bound_with_the_papers_reference() {
     let car = Car::new(0.05, 5.0 * DEGREE);
     let (errors, bound) = joint_errors(&car, 4);
     assert_on_the_bound(&errors, &bound, 4.0);
-    let digest = [309e-6, 309e-6, 309e-6, 309e-6, 1.4e-3, 1.5e-3, 2.5e-3, 0.04 * DEGREE];
-    for (i, deviation) in digest.into_iter().enumerate() {
+    let expected = [309e-6, 309e-6, 309e-6, 309e-6, 1.4e-3, 1.5e-3, 2.5e-3, 0.04 * DEGREE];
+    for (i, deviation) in expected.into_iter().enumerate() {
         let ratio = bound.bound[i] / deviation;
         assert!((0.3..1.3).contains(&ratio), "parameter {i}: {ratio}");
     }
@@ -104,7 +104,7 @@ fn runs_left_out_end_where_they_should() {
         assert!(before > 0.15 && after < 0.06, "{source:?}: {before} {after}");
     }
     let means = mean_ends(&found, "straight");
-    // Figure 6 as the digest expects it: 218 mm before on the rear axle; 20 mm after, and what few runs add.
+    // Figure 6 as the paper's numbers lead to expect it: 218 mm before on the rear axle; 20 mm after, and what few runs add.
     assert!((means.0 - 0.218).abs() < 0.03 && means.1 < 0.03, "{means:?}");
 }
 

@@ -1,4 +1,4 @@
-//! Which parameters sets of runs identify: the digest's table 3.3.
+//! Which parameters sets of runs identify.
 
 #![allow(clippy::expect_used)] // Helpers of tests are tests.
 

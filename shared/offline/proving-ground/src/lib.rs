@@ -27,7 +27,7 @@
 //!
 //! **Sources.** R. Rajamani, *Vehicle Dynamics and Control*, chapters 2 and 13 (balance of the plane body, understeer, tyre
 //! slip); H. B. Pacejka, *Tire and Vehicle Dynamics*, chapters 1 and 3 (steady slip, brush model, pneumatic trail,
-//! compliance of the steering); the digest of Lee, Chung and Chang for the geometry and the paper's car.
+//! compliance of the steering); Lee, Chung and Chang for the geometry and the paper's car.
 //!
 //! **What it leaves out.** The balance is quasi-steady: tyres build up their force without relaxation length (a few
 //! centimetres of rolling) and the body follows without side-slip transients (a few milliseconds at parking speed); a

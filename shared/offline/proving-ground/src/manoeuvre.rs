@@ -72,7 +72,7 @@ impl Manoeuvre {
     }
 
     /// The S path on which the paper's filter is judged: 1.0 m straight, 90 degrees left at 1.2 m, 0.5 m straight, 90
-    /// degrees right, 0.5 m straight, with ramps of 0.15 m; 5.77 m. Digest of the paper, section 4.2.
+    /// degrees right, 0.5 m straight, with ramps of 0.15 m; 5.77 m. See docs/reproduction.md.
     #[must_use]
     pub fn s_path(pace: Pace) -> Self {
         let sections = [
@@ -234,7 +234,7 @@ mod tests {
     const PACE: Pace = Pace { speed: 0.09, acceleration: 0.1 };
 
     #[test]
-    fn the_s_path_is_as_long_as_the_digest_says() {
+    fn the_s_path_is_as_long_as_it_is_said_to_be() {
         let manoeuvre = Manoeuvre::s_path(PACE);
         assert!((manoeuvre.length().unwrap() - 5.77).abs() < 1e-3);
         // 5.77 m at 0.09 m/s, one more ramp of 0.9 s, and two rests.

@@ -1,6 +1,6 @@
 //! The car of Lee, Chung and Chang, "Improvement of odometry accuracy and Parking Control for a Car-Like Mobile Robot",
-//! as its calibration found it: what is true on the proving ground. Where the paper is silent, what the digest of it
-//! (sections 4.2 and 4.4) chose.
+//! as its calibration found it: what is true on the proving ground. Where the paper is silent, what docs/reproduction.md
+//! says was chosen.
 
 use kerbside_geometry::{Drive, Pose, Vehicle, WHEELS, Wheel, angle};
 
@@ -17,7 +17,7 @@ const RESIDUALS: u64 = 8;
 pub const REAR_NOISE: f64 = 1e-3;
 
 impl Chassis {
-    /// Diameters of the paper's Table 1, tracks of its Table 2, the digest's wheelbase of 0.50 m; mass, its place and its
+    /// Diameters of the paper's Table 1, tracks of its Table 2, a wheelbase of 0.50 m; mass, its place and its
     /// inertia are those of a car of this size and chosen.
     #[must_use]
     pub fn paper() -> Self {
@@ -71,7 +71,7 @@ impl Chassis {
 
 impl Encoders {
     /// 2000 counts a turn at 50 Hz; the rear wheels err by 1 mm per square root of a metre, the front wheels' variance is
-    /// `front_share` of theirs: 1/3, 1 or 2 in the digest's three cases.
+    /// `front_share` of theirs: 1/3, 1 or 2 in the three cases.
     #[must_use]
     pub fn paper(front_share: f64) -> Self {
         let front = REAR_NOISE * front_share.sqrt();
@@ -117,7 +117,7 @@ impl Reference {
         }
     }
 
-    /// 2 mm and 2 mrad: what the digest asks of a reference that is to judge anything.
+    /// 2 mm and 2 mrad: what a reference needs that is to judge anything.
     #[must_use]
     pub fn fine() -> Self {
         Self::white(2e-3, 2e-3)
@@ -178,7 +178,7 @@ impl Sensors {
 }
 
 impl Actuators {
-    /// The simulated car of the digest's section 5: lags of 0.1 s, 1 rad/s, 35 degrees.
+    /// The simulated car that parks: lags of 0.1 s, 1 rad/s, 35 degrees.
     #[must_use]
     pub fn paper_parking() -> Self {
         Self {
@@ -192,7 +192,7 @@ impl Actuators {
 }
 
 impl Pace {
-    /// Up to `speed` \[m/s\] with the digest's 0.1 m/s^2; the paper drives at 0.09 and 0.26 m/s.
+    /// Up to `speed` \[m/s\] with 0.1 m/s^2; the paper drives at 0.09 and 0.26 m/s.
     #[must_use]
     pub fn paper(speed: f64) -> Self {
         Self { speed, acceleration: 0.1 }
@@ -215,7 +215,7 @@ pub struct Residuals {
 }
 
 impl Residuals {
-    /// One standard deviation of each in the digest's section 4.4: 0.05 % per radius, 1 mm per track, 2 mm of wheelbase,
+    /// One standard deviation of each: 0.05 % per radius, 1 mm per track, 2 mm of wheelbase,
     /// 0.3 degrees of steering zero.
     #[must_use]
     pub fn paper() -> Self {

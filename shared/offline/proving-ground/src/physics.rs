@@ -193,7 +193,7 @@ pub(crate) fn brush(load_share: f64) -> f64 {
 /// Angle of a front wheel at (`wheelbase`, `y`) that the rack's angle `steering` asks of it \[rad\], with `ackermann`
 /// of the way from parallel to its own circle.
 ///
-/// Source: digest of the paper, section 2a: tan d = L t / (L - y t) with t = tan(steering), in a form that is regular at
+/// Source: geometry of one centre of rotation: tan d = L t / (L - y t) with t = tan(steering), in a form that is regular at
 /// 90 degrees.
 pub(crate) fn wheel_angle(steering: f64, wheelbase: f64, y: f64, ackermann: f64) -> f64 {
     let (sin, cos) = math::sin_cos(steering);

@@ -49,8 +49,8 @@ fn straights_and_circles_end_where_geometry_says() {
 }
 
 #[test]
-fn wheels_roll_by_the_digests_geometry() {
-    // Digest, section 3.1: each wheel of a straight rolls its length; b = (right - left) / theta on an arc.
+fn wheels_roll_by_the_geometry_of_one_centre() {
+    // Each wheel of a straight rolls its length; b = (right - left) / theta on an arc.
     let chassis = Chassis::paper();
     let straight = end(&drive(Manoeuvre::straight(5.0, pace(0.2))).record(1));
     for (rotation, radius) in straight.rotation.iter().zip(chassis.radius) {

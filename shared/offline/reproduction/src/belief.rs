@@ -12,7 +12,7 @@ use crate::scatter::Trial;
 pub enum Knowledge {
     /// All of them, exactly.
     Known,
-    /// With the residual errors of digest section 4.4, whose size the filter knows.
+    /// With the residual errors of an ordinary calibration, whose size the filter knows.
     Residual,
     /// The same, and all radii wrong by one common factor of the same size besides.
     Common,

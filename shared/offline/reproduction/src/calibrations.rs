@@ -182,7 +182,7 @@ impl Told {
         })
     }
 
-    /// The same, the filter allowing besides for the residual errors of an ordinary calibration (digest section 4.4), as
+    /// The same, the filter allowing besides for the residual errors of an ordinary calibration ([`Residuals::paper`]), as
     /// it does where a vehicle's file says nothing.
     pub(crate) fn with_allowance(mut self) -> Self {
         let deviations = deviations(&Residuals::paper());

@@ -97,7 +97,7 @@ pub(crate) fn figures() -> Vec<Figure> {
             1e3 * right,
             Accept::AtMost(2.0),
         ),
-        // The digest found 504 mm beside 26 mm of noise: a yaw that is too small by cos^2 is no small matter.
+        // Beside 26 mm of noise: a yaw that is too small by cosine squared is no small matter.
         Figure::new(
             4,
             "S path's end by cos^2 yaw, no noise",

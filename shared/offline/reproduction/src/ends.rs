@@ -21,7 +21,7 @@ pub const NOISE_CASES: [(f64, &str); 3] =
 /// The paper's mean speeds, about \[m/s\].
 pub const SPEEDS: [f64; 2] = [0.09, 0.26];
 
-/// Largest ratio of fused to rear variance per case: parameters known, and with residual errors (digest row 6).
+/// Largest ratio of fused to rear variance per case: parameters known, and with residual errors (row 6).
 const ALLOWED: [[f64; 3]; 2] = [[0.30, 0.57, 0.80], [0.30, 0.37, 0.40]];
 
 /// Distances at which errors are taken along the path \[m\].
@@ -210,7 +210,7 @@ impl Ends {
         figures
     }
 
-    /// By the wheels alone, as the digest's figures for known parameters are; with residual errors it is shown beside.
+    /// By the wheels alone, as the limits for known parameters were found; with residual errors it is shown beside.
     fn blind_figure(&self, allowed: Accept, held: bool) -> Figure {
         let (ours, interval) = self.variance_ratio(Contender::FusedBlind, Contender::Rear);
         let name = format!("fused without steering/rear variance, {}", self.name());

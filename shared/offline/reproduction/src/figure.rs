@@ -41,7 +41,7 @@ impl Accept {
 pub enum Verdict {
     /// It is as accepted.
     Reached,
-    /// It is not, but its interval reaches into what is accepted, and there were fewer trials than the digest asks for.
+    /// It is not, but its interval reaches into what is accepted, and there were fewer trials than are asked for.
     Open,
     /// It is not.
     Missed,
@@ -104,7 +104,7 @@ impl Figure {
         self.accept != Accept::Shown
     }
 
-    /// What becomes of it; `full` where there were as many trials as the digest asks for.
+    /// What becomes of it; `full` where there were as many trials as are asked for.
     #[must_use]
     pub fn verdict(&self, full: bool) -> Verdict {
         if self.passed() {

@@ -1,5 +1,5 @@
 //! The experiments of Lee, Chung and Chang, "Improvement of odometry accuracy and Parking Control for a Car-Like Mobile
-//! Robot", run on the proving ground and held against the nine rows of acceptance of the digest's section 6.
+//! Robot", run on the proving ground and held against the nine rows of acceptance in docs/reproduction.md.
 //!
 //! ```text
 //! proving ground -> readings -> calibration | ingest -> estimator -> tracker -> figures with what is accepted

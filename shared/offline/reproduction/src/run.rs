@@ -13,7 +13,7 @@ use crate::{conversion, tables};
 /// How many rows there are.
 pub const ROWS: u8 = 9;
 
-/// Trials that the digest asks for; with fewer of them, what an interval does not decide is open.
+/// Trials that are asked for; with fewer of them, what an interval does not decide is open.
 pub const FULL: usize = 400;
 
 /// What is asked for.

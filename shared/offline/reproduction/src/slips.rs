@@ -35,7 +35,7 @@ const fn kind(name: &'static str, travel: f64, wheel: Wheel, both: bool) -> Kind
     Kind { name, travel, wheel, both }
 }
 
-/// What the digest's row 8 asks, and beyond it a smaller spin of both wheels, and a skid of a front wheel.
+/// What row 8 asks, and beyond it a smaller spin of both wheels, and a skid of a front wheel.
 const KINDS: [Kind; 7] = [
     kind("none", 0.0, Wheel::RearLeft, false),
     kind("rl 5 mm", 0.005, Wheel::RearLeft, false),

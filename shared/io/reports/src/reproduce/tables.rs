@@ -63,7 +63,7 @@ pub(super) fn figures(reproduction: &Reproduction, row: u8, held: bool) -> Table
     Table::new(caption, &columns, "").with_rows(rows)
 }
 
-/// Mean error, variance ratio and NEES per contender and case: the digest's tables.
+/// Mean error, variance ratio and NEES per contender and case.
 pub(super) fn ends(ends: &[Ends]) -> Table {
     let columns = ["case", "filter", "#mean error", "#variance/rear", "#NEES/3"];
     let rows = ends.iter().flat_map(|case| {

@@ -138,6 +138,11 @@ impl Grid {
         Some((0..self.steps()).map(turn).collect())
     }
 
+    /// Whether wheels or sensor tell how the vehicle turns.
+    pub(crate) fn tells_turn(&self) -> bool {
+        self.rear_turn().or_else(|| self.front_turn()).or_else(|| self.steering_turn()).is_some()
+    }
+
     /// Turn per step by the best of the wheels and the sensor; 0 where none tells.
     pub(crate) fn turn(&self) -> Vec<f64> {
         self.rear_turn()
@@ -189,6 +194,8 @@ pub(crate) struct Chord {
     pub(crate) rolled: f64,
     /// Turn by the wheels \[rad\].
     pub(crate) turn: f64,
+    /// Between the headings farthest to the left and to the right on the way \[rad\].
+    pub(crate) swing: f64,
 }
 
 impl Chord {
@@ -197,9 +204,9 @@ impl Chord {
         (self.distance * math::sinc(0.5 * self.turn)).abs()
     }
 
-    /// Whether it goes in one direction, and turns by less than half a turn.
+    /// Whether it goes in one direction, and never points farther apart than some third of a turn.
     pub(crate) fn is_plain(&self) -> bool {
-        self.distance.abs() > 0.95 * self.rolled && self.turn.abs() < 2.0
+        self.distance.abs() > 0.95 * self.rolled && self.swing < 2.0
     }
 }
 
@@ -231,10 +238,18 @@ pub(crate) fn chords(run: &Run, grid: &Grid, least: f64) -> Vec<Chord> {
             distance: between(&distance),
             rolled: between(&rolled),
             turn: between(&turn),
+            swing: swing(&turn[grid.place(first.t).0..=grid.place(reading.t).0 + 1]),
         });
         begin = Some(reading);
     }
     chords
+}
+
+/// From the least to the largest.
+fn swing(headings: &[f64]) -> f64 {
+    let largest = headings.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let least = headings.iter().copied().fold(f64::INFINITY, f64::min);
+    largest - least
 }
 
 /// Mean direction of angles \[rad\].

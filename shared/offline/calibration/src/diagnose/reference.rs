@@ -41,6 +41,10 @@ pub(crate) fn check_units(
             format!("it reads up to {:.1}: degrees instead of radians?", largest(&steering.value));
         found.forbid(Problem::SteeringUnit, evidence);
     }
+    if !grid.tells_turn() {
+        // Nothing on board to hold a heading or a way against.
+        return;
+    }
     let yaws: Vec<f64> = run.reference.iter().filter_map(|reading| reading.yaw).collect();
     let spread = yaws.iter().copied().fold(f64::NEG_INFINITY, f64::max)
         - yaws.iter().copied().fold(f64::INFINITY, f64::min);

@@ -69,7 +69,7 @@ pub(crate) fn check(
         let evidence = format!(
             "called {}, it turns by {:.1} degrees in all",
             run.manoeuvre,
-            angle::degrees(turned)
+            angle::degrees(turned).abs()
         );
         found.add(Problem::NoTurning, evidence, false);
     }

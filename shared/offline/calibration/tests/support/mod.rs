@@ -11,7 +11,7 @@ use kerbside_geometry::{Pose, Vehicle};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// Counts of a wheel's turn, and seconds between readings: those of the digest's simulations.
+/// Counts of a wheel's turn, and seconds between readings: those of all the project's simulations of the paper.
 pub const COUNTS: f64 = 2000.0;
 pub const STEP: f64 = 0.02;
 /// Driving speed \[m/s\] and acceleration \[m/s^2\].
@@ -61,7 +61,7 @@ pub struct Car {
     pub wheels: [bool; 4],
 }
 
-/// Tables 1 and 2 as truth, the wheelbase as chosen in the digest.
+/// Tables 1 and 2 as truth, the wheelbase as chosen in docs/reproduction.md.
 pub fn tables() -> Parameters {
     let mut truth = Parameters::nominal(&nominal());
     for (index, value) in

@@ -70,7 +70,7 @@ impl Driver {
     }
 }
 
-/// The digest's vehicle, as `chassis` is believed.
+/// The vehicle, as `chassis` is believed.
 fn vehicle(chassis: &Chassis, sensors: &Sensors, knows_lag: bool) -> Vehicle {
     let vehicle = chassis.believed(sensors);
     let steering = Actuators::paper_parking().steering_limit;

@@ -1,4 +1,4 @@
-//! The digest's two manoeuvres, as plans.
+//! The two manoeuvres, as plans.
 
 use kerbside_geometry::{Pose, angle, math};
 use kerbside_messages::{Plan, TrajectoryPoint};
@@ -8,10 +8,10 @@ use kerbside_proving_ground::{
 
 use super::{ARM, RATE};
 
-/// How the plans are driven: the digest's.
+/// How the plans are driven.
 const PACE: Pace = Pace { speed: 0.1, acceleration: 0.1 };
 
-/// A manoeuvre of the digest's section 5.
+/// A manoeuvre of Figure 10.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scene {
     /// Forward 35 degrees and in reverse 55 degrees at 0.9 m, then 0.7 m straight; 2.63 m.
@@ -41,8 +41,8 @@ impl Scene {
         }
     }
 
-    /// The path. The digest does not say how long the straights are in which the curvature rises and falls over 0.15 m:
-    /// they are what makes its length the digest's.
+    /// The path. Nothing says how long the straights are in which the curvature rises and falls over 0.15 m:
+    /// they are what makes its length that of docs/reproduction.md.
     fn manoeuvre(self) -> Manoeuvre {
         const RADIUS: f64 = 0.9;
         const RAMP: f64 = 0.15;
