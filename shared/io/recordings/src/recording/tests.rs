@@ -289,13 +289,15 @@ fn another_layout_is_named_with_its_version() {
 
     let report = check(&path).unwrap();
     assert!(!report.is_sound() && report.damage.is_empty());
-    assert_eq!(report.problems(), ["topic raw: layout version 9; this build reads 1"]);
+    let ours = kerbside_messages::LAYOUT_VERSION;
+    let problem = format!("topic raw: layout version 9; this build reads {ours}");
+    assert_eq!(report.problems(), [problem]);
     assert_eq!(report.messages(), 2);
     let error = RecordingReader::open(&path).unwrap().read_all::<Raw>().unwrap_err().to_string();
     assert_eq!(
         error,
         format!(
-            "{}: topic raw was recorded in layout version 9; this build reads version 1",
+            "{}: topic raw was recorded in layout version 9; this build reads version {ours}",
             path.display()
         )
     );
