@@ -75,7 +75,6 @@ pub(crate) fn trial(knowledge: Knowledge, sensors: &Sensors, seed: u64) -> Trial
         belief: Belief {
             vehicle: believed.believed(sensors),
             prior: prior(knowledge, sensors),
-            steering_zero: 0.0,
             start: Pose::default(),
         },
         steering_zero: drawn.steering_zero,

@@ -213,7 +213,6 @@ impl Told {
         let belief = Belief {
             vehicle: parameters.applied(&self.nominal),
             prior: self.prior.clone(),
-            steering_zero: parameters.values[7],
             start: Pose::default(),
         };
         Trial { belief, steering_zero: 0.0 }

@@ -75,8 +75,6 @@ pub(crate) struct Belief {
     pub(crate) vehicle: Vehicle,
     /// What its calibration left open.
     pub(crate) prior: ParameterPrior,
-    /// What its steering sensor is known to read while the wheels stand straight \[rad\].
-    pub(crate) steering_zero: f64,
     /// Where it starts.
     pub(crate) start: Pose,
 }
@@ -87,7 +85,6 @@ pub(crate) struct Follower {
     ingest: Ingest,
     estimator: Estimator,
     travel: Travel,
-    steering_zero: f64,
     /// The newest estimate.
     pub(crate) odometry: Odometry,
 }
@@ -105,15 +102,13 @@ impl Follower {
             ingest: Ingest::with_sensors(vehicle, &sensors, &IngestSettings::default())?,
             estimator: Estimator::with_prior(vehicle, &sensors, &settings, &belief.prior)?,
             travel: Travel::default(),
-            steering_zero: belief.steering_zero,
             odometry: Odometry::default(),
         })
     }
 
     /// Takes in a reading.
     pub(crate) fn feed(&mut self, raw: &Raw) -> &Odometry {
-        let raw = Raw { steering: raw.steering - self.steering_zero, ..*raw };
-        self.ingest.step(&raw, 0, false, &mut self.travel);
+        self.ingest.step(raw, 0, false, &mut self.travel);
         let inputs = EstimatorInputs { travel: &self.travel, missing: 0, fix: None, restore: None };
         self.estimator.step(inputs, &mut self.odometry);
         &self.odometry
@@ -166,4 +161,30 @@ pub(crate) fn readings(recorded: &Recorded) -> Vec<Raw> {
         raws.push(reading(counts.time, frame, &counts.value, newest));
     }
     raws
+}
+
+#[cfg(test)]
+mod tests {
+    use kerbside_geometry::SteeringSensor;
+    use kerbside_proving_ground::{Chassis, Sensors as Fitted};
+
+    use super::*;
+
+    #[test]
+    fn a_known_steering_zero_is_taken_out_once() {
+        const ZERO: f64 = 0.03;
+        let mut vehicle = Chassis::paper().believed(&Fitted::paper(1.0));
+        let sensor =
+            vehicle.steering_sensor.map(|sensor| SteeringSensor { offset: ZERO, ..sensor });
+        vehicle.steering_sensor = sensor;
+        let prior = ParameterPrior::known();
+        let belief = Belief { vehicle, prior, start: Pose::default() };
+        let mut follower = Follower::new(Contender::Fused, &belief).unwrap();
+        for frame in 0..200 {
+            let counts = [Some(i64::from(frame) * 20); 4];
+            follower.feed(&reading(0.02 * f64::from(frame), frame, &counts, Some(ZERO)));
+        }
+        // Not to the bit: the diameters differ.
+        assert!(follower.odometry.distance > 0.5 && follower.pose().yaw.abs() < 0.02);
+    }
 }

@@ -135,7 +135,7 @@ pub(super) fn setting(driver: Driver, given: &Given, seed: u64) -> Setting {
     Setting {
         physics,
         slips: spins.then(|| Slip::spin(Wheel::RearLeft, 0.03, half, 0.3)).into_iter().collect(),
-        belief: Belief { vehicle: vehicle.clone(), prior, steering_zero: 0.0, start },
+        belief: Belief { vehicle: vehicle.clone(), prior, start },
         vehicle,
         sensors,
         contender: driver.contender(),
