@@ -175,7 +175,10 @@ mod tests {
             prop_assert!(found.len() >= 4, "only {}", found.len());
             for link in &found {
                 let end = chain(from, link.pieces()).last().unwrap().end();
-                prop_assert!(end.distance(&to) < 1e-9, "{:?} ends at {:?}", link, end);
+                // Between nearly parallel lines a link may be kilometres long: rounding grows with its length.
+                let length: f64 = link.pieces().iter().map(|piece| piece.length.abs()).sum();
+                let bound = 1e-9_f64.max(1e-11 * length);
+                prop_assert!(end.distance(&to) < bound, "{:?} ends at {:?}", link, end);
                 prop_assert!(angle::wrap(end.yaw - to.yaw).abs() < 1e-9);
                 for piece in link.pieces() {
                     prop_assert!(piece.curvature.abs() <= limit * (1.0 + 1e-12));
