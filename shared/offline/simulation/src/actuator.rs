@@ -3,19 +3,28 @@
 
 use crate::delay::Delay;
 use crate::lag::Lag;
+use crate::plant::Actuation;
 
-/// Delay, limit, lag.
+/// Gain, dead zone, delay, limit, lag.
 #[derive(Clone, Debug)]
 pub(crate) struct Actuator {
     commands: Delay,
+    gain: f64,
+    dead_zone: f64,
     limit: f64,
     lag: Lag,
 }
 
 impl Actuator {
-    /// At rest at zero: `delay` \[s\], `limit` of the value, `lag` \[s\], `rate_limit` \[1/s\].
-    pub(crate) fn new(delay: f64, limit: f64, lag: f64, rate_limit: f64) -> Self {
-        Self { commands: Delay::new(delay), limit, lag: Lag::new(lag, rate_limit) }
+    /// At rest at zero.
+    pub(crate) fn new(actuation: &Actuation) -> Self {
+        Self {
+            commands: Delay::new(actuation.delay),
+            gain: actuation.gain,
+            dead_zone: actuation.dead_zone,
+            limit: actuation.limit,
+            lag: Lag::new(actuation.lag, actuation.rate_limit),
+        }
     }
 
     /// Takes in a command stamped `stamp` \[s\].
@@ -26,7 +35,13 @@ impl Actuator {
     /// Lets the commands act that are due at `now` \[s\]. Returns whether the value jumped.
     pub(crate) fn begin(&mut self, now: f64) -> bool {
         let due = self.commands.take(now);
-        due.is_some_and(|value| self.lag.aim(value.clamp(-self.limit, self.limit)))
+        due.is_some_and(|value| self.lag.aim(self.wanted(value)))
+    }
+
+    fn wanted(&self, command: f64) -> f64 {
+        let wanted = command * self.gain;
+        let wanted = if wanted.abs() < self.dead_zone { 0.0 } else { wanted };
+        wanted.clamp(-self.limit, self.limit)
     }
 
     /// When the next command begins to act \[s\].

@@ -75,6 +75,32 @@ impl Lag {
         }
     }
 
+    /// Rates now and at the two values that [`Self::ahead`] foretells, all on this side of the next
+    /// kink \[1/s\].
+    pub(crate) fn rates(&self, ahead: &[f64; 2]) -> [f64; 3] {
+        match self.phase() {
+            Phase::Settled => [0.0; 3],
+            Phase::Ramp { rate } => [rate; 3],
+            Phase::Decay if self.lag == 0.0 => [0.0; 3],
+            Phase::Decay => {
+                [self.value, ahead[0], ahead[1]].map(|value| (self.target - value) / self.lag)
+            }
+        }
+    }
+
+    /// Time until the value passes through zero \[s\]; infinity where it does not.
+    pub(crate) fn zero(&self) -> f64 {
+        if self.value * self.target >= 0.0 {
+            return f64::INFINITY;
+        }
+        match self.phase() {
+            Phase::Settled => f64::INFINITY,
+            // A ramp that ends before zero is left to the decay after it.
+            Phase::Ramp { rate } => -self.value / rate,
+            Phase::Decay => self.lag * math::ln((self.target - self.value) / self.target),
+        }
+    }
+
     /// Moves on to `value`, one of [`Self::ahead`].
     pub(crate) fn move_to(&mut self, value: f64) {
         self.value = value;
@@ -167,6 +193,34 @@ mod tests {
         let mut lag = Lag::new(0.2, f64::INFINITY);
         lag.aim(1.0);
         assert!((run(&mut lag, 0.2, 0.01) - (1.0 - (-1.0_f64).exp())).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_value_is_zero_when_foretold_and_its_rate_is_its_derivative() {
+        for (limit, from, to) in [(0.3, 0.4, -0.4), (0.3, -0.02, 0.01), (f64::INFINITY, 0.4, -0.2)]
+        {
+            let mut lag = Lag::new(0.1, limit);
+            lag.move_to(from);
+            lag.aim(to);
+            let mut zero = lag.zero();
+            while lag.smooth() < zero {
+                let step = lag.smooth().min(0.01);
+                let [_, end] = lag.ahead(step);
+                lag.move_to(end);
+                zero -= step;
+                assert!((lag.zero() - zero).abs() < 1e-12, "{} {zero}", lag.zero());
+            }
+            assert!(lag.ahead(zero)[1].abs() < 1e-15);
+            let ahead = lag.ahead(2e-6);
+            let rates = lag.rates(&ahead);
+            let slope = (ahead[1] - lag.value()) / 2e-6;
+            assert!((rates[1] - slope).abs() < 1e-6, "{rates:?} {slope}");
+            assert!((rates[0] + rates[2] - 2.0 * rates[1]).abs() < 1e-6, "{rates:?}");
+        }
+        let mut lag = Lag::new(0.1, 0.3);
+        assert_eq!((lag.zero(), lag.rates(&[0.0; 2])), (f64::INFINITY, [0.0; 3]));
+        lag.aim(0.2);
+        assert_eq!(lag.zero(), f64::INFINITY, "it is there already");
     }
 
     #[test]

@@ -2,12 +2,12 @@
 
 use core::f64::consts::TAU;
 
-use kerbside_geometry::{SteeringSensor, Vehicle, WHEELS};
+use kerbside_geometry::{Vehicle, WHEELS};
 
-use crate::body::Body;
-use crate::ground::Motion;
 use crate::noise::Noise;
 use crate::normal::Normal;
+use crate::plant::Sensors;
+use crate::stepper::Knot;
 
 /// One reading of every sensor the vehicle has.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,14 +30,14 @@ pub struct SensorReading {
 /// Encoders, steering sensor and gyro, with their errors.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensing {
-    radius: [f64; 4],
+    sensors: Sensors,
     counts_per_radian: [f64; 4],
     counts_mask: u8,
     speeds_mask: u8,
     counter_bits: u32,
     first_counts: [i64; 4],
     phase: [f64; 4],
-    steering: Option<SteeringSensor>,
+    has_steering: bool,
     has_gyro: bool,
     noise: Noise,
     normal: Normal,
@@ -49,19 +49,19 @@ pub(crate) struct Sensing {
 
 impl Sensing {
     /// The sensors of `vehicle`.
-    pub(crate) fn new(vehicle: &Vehicle, noise: &Noise, seed: u64) -> Self {
+    pub(crate) fn new(vehicle: &Vehicle, sensors: &Sensors, noise: &Noise, seed: u64) -> Self {
         let mut normal = Normal::new(seed);
         let encoders =
             vehicle.encoders.map_or([None; 4], |encoders| encoders.counts_per_revolution);
         Self {
-            radius: vehicle.radius,
+            sensors: sensors.clone(),
             counts_per_radian: encoders.map(|counts| counts.unwrap_or_default() / TAU),
             counts_mask: mask(encoders.map(|counts| counts.is_some())),
             speeds_mask: if vehicle.encoders.is_some() { 0 } else { wheels_mask(vehicle) },
             counter_bits: vehicle.encoders.map_or(64, |encoders| encoders.counter_bits),
             first_counts: [0; 4],
             phase: core::array::from_fn(|_| noise.phase * normal.uniform()),
-            steering: vehicle.steering_sensor,
+            has_steering: vehicle.steering_sensor.is_some(),
             has_gyro: vehicle.gyro.is_some(),
             noise: *noise,
             normal,
@@ -75,40 +75,36 @@ impl Sensing {
         self.first_counts = counts;
     }
 
-    /// Reads all sensors at `now` \[s\].
-    pub(crate) fn read(
-        &mut self,
-        now: f64,
-        body: &Body,
-        motion: &Motion,
-        rack: f64,
-    ) -> SensorReading {
-        let error = self.wheel_errors(body);
-        let elapsed = now - self.read.1;
-        self.read = (body.turned, now);
+    /// Reads all sensors `now`; the encoders show the state `seen`. `turned` is how far each wheel
+    /// has turned in either direction \[rad\].
+    pub(crate) fn read(&mut self, now: &Knot, seen: &Knot, turned: [f64; 4]) -> SensorReading {
+        let error = self.wheel_errors(turned);
+        let elapsed = now.time - self.read.1;
+        self.read = (turned, now.time);
+        let rotation = self.sensors.shown(seen.rotation);
+        let extra = error.map(|error| if elapsed > 0.0 { error / elapsed } else { 0.0 });
+        let shown = self.sensors.shown(seen.rotation_rate);
         SensorReading {
-            counts: core::array::from_fn(|wheel| self.count(wheel, body.rotation[wheel])),
+            counts: core::array::from_fn(|wheel| self.count(wheel, rotation[wheel])),
             counts_mask: self.counts_mask,
-            speeds: core::array::from_fn(|wheel| {
-                let extra = if elapsed > 0.0 { error[wheel] / elapsed } else { 0.0 };
-                self.speed(wheel, motion.rotation_rate[wheel] + extra)
-            }),
+            speeds: core::array::from_fn(|wheel| self.speed(wheel, shown[wheel] + extra[wheel])),
             speeds_mask: self.speeds_mask,
-            steering: self.angle(rack),
-            yaw_rate: self.rate(motion.yaw_rate),
+            steering: self.angle(now.rack),
+            yaw_rate: self.rate(now.yaw_rate),
         }
     }
 
     /// Draws what each wheel's noise adds since the previous reading \[rad\]: its variance grows
     /// with the travel alone, so how often the sensors are read changes nothing of its size.
-    fn wheel_errors(&mut self, body: &Body) -> [f64; 4] {
+    fn wheel_errors(&mut self, turned: [f64; 4]) -> [f64; 4] {
         let mut drawn = [0.0; 4];
         if self.noise.wheel == 0.0 {
             return drawn;
         }
         for (wheel, drawn) in drawn.iter_mut().enumerate() {
-            let travel = (body.turned[wheel] - self.read.0[wheel]) * self.radius[wheel];
-            *drawn = self.noise.wheel * travel.sqrt() / self.radius[wheel] * self.normal.sample();
+            let radius = self.sensors.radius[wheel];
+            let travel = (turned[wheel] - self.read.0[wheel]) * radius;
+            *drawn = self.noise.wheel * travel.sqrt() / radius * self.normal.sample();
             self.error[wheel] += *drawn;
         }
         drawn
@@ -128,16 +124,18 @@ impl Sensing {
     }
 
     fn speed(&self, wheel: usize, rotation_rate: f64) -> f64 {
-        if self.speeds_mask & (1 << wheel) == 0 { 0.0 } else { rotation_rate * self.radius[wheel] }
+        let missing = self.speeds_mask & (1 << wheel) == 0;
+        if missing { 0.0 } else { rotation_rate * self.sensors.radius[wheel] }
     }
 
     fn angle(&mut self, rack: f64) -> Option<f64> {
-        let sensor = self.steering?;
-        Some(sensor.reading(rack) + white(&mut self.normal, self.noise.steering))
+        let reading = self.sensors.steering(rack);
+        self.has_steering.then(|| reading + white(&mut self.normal, self.noise.steering))
     }
 
     fn rate(&mut self, yaw_rate: f64) -> Option<f64> {
-        self.has_gyro.then(|| yaw_rate + white(&mut self.normal, self.noise.gyro))
+        let reading = self.sensors.yaw_rate(yaw_rate);
+        self.has_gyro.then(|| reading + white(&mut self.normal, self.noise.gyro))
     }
 }
 

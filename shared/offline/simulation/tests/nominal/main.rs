@@ -5,5 +5,6 @@
 mod bits;
 mod motion;
 mod sensing;
+#[path = "../common/mod.rs"]
 mod support;
 mod vectors;

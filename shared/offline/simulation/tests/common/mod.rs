@@ -1,10 +1,14 @@
 //! Reads the small files beside the tests.
+// Not every test needs all of it.
+#![allow(dead_code)]
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use kerbside_geometry::{
     Actuators, Drive, Encoders, Footprint, Gyro, Limits, Pose, Reference, SteeringSensor, Vehicle,
+    WHEELS,
 };
+use kerbside_simulation::{Effect, Overlay};
 use toml::{Table, Value};
 
 /// A folder of vectors.
@@ -14,10 +18,38 @@ pub(crate) struct Vectors {
     pub(crate) rows: Vec<Vec<f64>>,
 }
 
+/// The folder of one car.
+pub(crate) fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/vectors").join(name)
+}
+
+/// What a car did with one overlay: the overlay and the rows.
+pub(crate) fn altered(name: &str, overlay: &str) -> (Overlay, Vec<Vec<f64>>) {
+    let read = |ending: &str| {
+        std::fs::read_to_string(folder(name).join(format!("{overlay}.{ending}"))).expect("readable")
+    };
+    (overlay_of(&read("toml").parse().expect("TOML")), rows(&read("csv")))
+}
+
+fn overlay_of(root: &Table) -> Overlay {
+    let mut overlay = Overlay::new();
+    let tables = root.get("effect").and_then(Value::as_array);
+    for table in tables.into_iter().flatten().filter_map(Value::as_table) {
+        let wheel = table.get("wheel").and_then(Value::as_str);
+        let wheel = wheel.map(|name| WHEELS.into_iter().find(|wheel| wheel.name() == name));
+        let names = table.keys().filter(|key| !["id", "wheel"].contains(&key.as_str()));
+        let values: Vec<(&str, f64)> =
+            names.map(|name| (name.as_str(), number(table, name))).collect();
+        let id = table["id"].as_str().expect("text");
+        let effect = Effect::new(id, wheel.flatten(), &values).expect("an effect");
+        overlay.add(effect).expect("each once");
+    }
+    overlay
+}
+
 /// Reads the vectors of one car.
 pub(crate) fn vectors(name: &str) -> Vectors {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/vectors").join(name);
-    let read = |file: &str| std::fs::read_to_string(folder.join(file)).expect("readable");
+    let read = |file: &str| std::fs::read_to_string(folder(name).join(file)).expect("readable");
     Vectors {
         vehicle: vehicle(&read("vehicle.toml").parse().expect("TOML")),
         commands: rows(&read("commands.csv")),
