@@ -42,12 +42,16 @@
 
 mod actuators;
 mod balance;
+mod car;
+pub mod cases;
 mod chassis;
 mod colour;
 mod contact;
 mod drive;
+pub mod insertions;
 mod instruments;
 mod leg;
+pub mod library;
 mod manoeuvre;
 mod normal;
 mod paper;
