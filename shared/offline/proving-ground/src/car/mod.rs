@@ -11,7 +11,7 @@ use kerbside_geometry::{Vehicle, WHEELS, math};
 use crate::cases::{Disturbance, Drives, Signals, Specification, Task};
 use crate::chassis::Chassis;
 use crate::contact::{Contacts, Drivetrain, Motion};
-use crate::insertions::{Insertions, Instant};
+use crate::insertions::{Insertions, Present};
 use crate::library::Asked;
 use crate::physics::{Actuators, Linkage, Physics, Tyres};
 
@@ -209,7 +209,7 @@ impl<'a> Car<'a> {
         let servo_rate =
             steering.rate(y[SERVO], targets.1, self.stuck, lags[1], limits.steering_rate);
         let rack = steering.play(self.rack, y[SERVO]);
-        let now = Instant {
+        let now = Present {
             time,
             place: (y[0], y[1]),
             yaw: y[YAW],
@@ -244,7 +244,7 @@ impl<'a> Car<'a> {
         rates
     }
 
-    fn motion(&mut self, now: &Instant, noise_slip: f64, drivetrain: &Drivetrain) -> Motion {
+    fn motion(&mut self, now: &Present, noise_slip: f64, drivetrain: &Drivetrain) -> Motion {
         let grip = (1.0 - self.insertions.ground.slip(now)) * (1.0 - noise_slip);
         let mut radius = self.insertions.ground.radius(self.chassis.radius, now);
         for (radius, driven) in radius.iter_mut().zip(self.driven) {
@@ -270,7 +270,7 @@ impl<'a> Car<'a> {
         let counts = self.believed.encoders.is_some();
         let wheels = |time: &f64| if counts { rotation(*time) } else { speeds(*time) };
         let yaw_rate = |time: &f64| {
-            let rates = trajectory.at(*time).rates;
+            let rates = trajectory.at(*time - task.case.build.gyro_latency).rates;
             sensing.yaw_rate(rates[YAW], rates[WAY], *time)
         };
         let marker = self.believed.reference.map(|reference| sight.marker(&reference.marker));

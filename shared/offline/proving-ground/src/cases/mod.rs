@@ -22,6 +22,7 @@ mod label;
 mod plan;
 mod put_in;
 mod record;
+mod series;
 mod specification;
 mod text;
 mod vehicle;
@@ -32,8 +33,9 @@ pub use crate::car::SecondVehicle;
 pub use floor::{Disturbance, Floor};
 pub use label::Label;
 pub use record::{Drives, Errors, Rows, Signals, Task};
+pub use series::series;
 pub use specification::{Build, Kind, Plan, Specification, Stamps, Uncertainty};
-pub use text::vehicle_text;
+pub use text::{run_text, vehicle_text};
 
 use dice::Dice;
 use put_in::Wanted;
@@ -122,12 +124,9 @@ impl Case {
     ) -> Rows {
         let case = &self.specification;
         let effects = self.acting(plan, inserted, errors);
-        let disturbance = match errors {
-            Errors::None => Disturbance::NONE,
-            Errors::Drawn(seed) => {
-                Disturbance::drawn(&case.floor, plan.duration, record::mixed(plan.seed, seed))
-            }
-        };
+        let disturbance = errors.seed().map_or(Disturbance::NONE, |seed| {
+            Disturbance::drawn(&case.floor, plan.duration, record::mixed(plan.seed, seed))
+        });
         let task = Task { case, plan, effects: &effects, disturbance: &disturbance };
         record::observed(case, plan, &plant.drive(&task), errors)
     }

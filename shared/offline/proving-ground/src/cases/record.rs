@@ -19,9 +19,12 @@ const STEERING: u64 = 32;
 const GYRO: u64 = 33;
 const REFERENCE: u64 = 34;
 const STATED: u64 = 37;
-/// Steps in which values are written: wheel speed \[m/s\], angle \[rad\].
+/// Counters begin below this.
+const FIRST_COUNT: f64 = 900.0;
+/// Steps in which values are written: wheel speed \[m/s\], angle \[rad\], everything else in SI units.
 const SPEED_STEP: f64 = 0.002;
 const ANGLE_STEP: f64 = 0.0005;
+const STEP: f64 = 1e-4;
 
 /// What a plant is told to drive.
 #[derive(Clone, Copy, Debug)]
@@ -64,6 +67,18 @@ pub enum Errors {
     None,
     /// All, drawn by the plan's seed and this one; 0 gives the case as it is handed out.
     Drawn(u64),
+    /// The same, but counters begin at 0 and do not wrap, so that many seeds make a covariance.
+    Unwrapped(u64),
+}
+
+impl Errors {
+    /// The seed of what errs.
+    pub(super) fn seed(self) -> Option<u64> {
+        match self {
+            Self::None => None,
+            Self::Drawn(seed) | Self::Unwrapped(seed) => Some(seed),
+        }
+    }
 }
 
 /// The rows of a run's files. Arrays of four are fl, fr, rl, rr; a value that was not read is none.
@@ -119,10 +134,7 @@ pub(super) fn observed(
     signals: &Signals,
     errors: Errors,
 ) -> Rows {
-    let seed = match errors {
-        Errors::None => None,
-        Errors::Drawn(seed) => Some(mixed(plan.seed, seed)),
-    };
+    let seed = errors.seed().map(|seed| mixed(plan.seed, seed));
     let floor = &case.floor;
     let mut out = Rows {
         name: plan.name.clone(),
@@ -144,7 +156,7 @@ pub(super) fn observed(
     match &case.vehicle.encoders {
         Some(encoders) => {
             let per_turn = encoders.counts_per_revolution;
-            let counter = Counter::new(encoders.counter_bits, seed);
+            let counter = Counter::new(encoders.counter_bits, seed, errors);
             out.counts = rows(stamps, &signals.wheels, |_, rotation| {
                 core::array::from_fn(|i| {
                     per_turn[i].map(|n| counter.shown(i, rotation[i] / TAU * n))
@@ -179,17 +191,21 @@ fn state_by_hand(
 
 /// Quantises and wraps.
 struct Counter {
-    bits: u32,
+    /// Range of the counter; none where it does not end.
+    range: Option<f64>,
     first: Option<[f64; 4]>,
 }
 
 impl Counter {
-    fn new(bits: u32, seed: Option<u64>) -> Self {
+    fn new(bits: u32, seed: Option<u64>, errors: Errors) -> Self {
+        let wraps = matches!(errors, Errors::Drawn(_));
+        let reach = if wraps { FIRST_COUNT } else { 1.0 };
         let first = seed.map(|seed| {
             let mut normal = Normal::new(seed, FIRST_COUNTS);
-            core::array::from_fn(|_| 900.0 * normal.uniform())
+            core::array::from_fn(|_| reach * normal.uniform())
         });
-        Self { bits: bits.clamp(1, 52), first }
+        let bits = i32::try_from(bits.clamp(1, 52)).unwrap_or(52);
+        Self { range: wraps.then(|| 2.0_f64.powi(bits)), first }
     }
 
     /// What is shown of `steps`; the counter is signed.
@@ -197,9 +213,8 @@ impl Counter {
         let Some(first) = self.first else {
             return steps;
         };
-        let whole = 2.0_f64.powi(i32::try_from(self.bits).unwrap_or(52));
         let count = (first[wheel] + steps).floor();
-        count - whole * ((count + 0.5 * whole) / whole).floor()
+        self.range.map_or(count, |range| count - range * (count / range + 0.5).floor())
     }
 }
 
@@ -220,6 +235,7 @@ fn add_noise(floor: &Floor, seed: u64, out: &mut Rows) {
     let (mut normal, mut process) = (Normal::new(seed, GYRO), Process::new(floor.gyro_coloured));
     for Stamped { time, value } in &mut out.yaw_rate {
         *value += process.at(*time, &mut normal) + normal.scaled(floor.gyro);
+        *value = rounded(*value, STEP);
     }
     let mut normals =
         [REFERENCE, REFERENCE + 1, REFERENCE + 2].map(|stream| Normal::new(seed, stream));
@@ -230,6 +246,7 @@ fn add_noise(floor: &Floor, seed: u64, out: &mut Rows) {
         let [x, y, yaw] = core::array::from_fn(|i| {
             processes[i].at(*time, &mut normals[i]) + normals[i].scaled(white[i])
         });
-        *value = (value.0 + x, value.1 + y, value.2.map(|heading| heading + yaw));
+        let [x, y] = [value.0 + x, value.1 + y].map(|place| rounded(place, STEP));
+        *value = (x, y, value.2.map(|heading| rounded(heading + yaw, STEP)));
     }
 }

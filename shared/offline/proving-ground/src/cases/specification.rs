@@ -107,6 +107,8 @@ pub struct Build {
     pub linkage: f64,
     /// Toe of each front wheel, inwards \[rad\].
     pub toe: f64,
+    /// By which the gyro is late: part of what every gyro is \[s\].
+    pub gyro_latency: f64,
 }
 
 /// A case.

@@ -1,9 +1,10 @@
-//! The text of `vehicle.toml`.
+//! The texts of `vehicle.toml` and `run.toml`.
 
 use core::fmt::Write;
 
 use kerbside_geometry::{Drive, Vehicle, WHEELS};
 
+use super::record::Rows;
 use super::specification::{Specification, Uncertainty};
 
 /// What the description of a case's vehicle says.
@@ -54,7 +55,7 @@ fn sensors(text: &mut String, vehicle: &Vehicle) -> core::fmt::Result {
     if let Some(encoders) = &vehicle.encoders {
         let counts = WHEELS.into_iter().filter_map(|wheel| {
             let counts = encoders.counts_per_revolution[wheel.index()]?;
-            Some(format!("{} = {counts:?}", wheel.name()))
+            Some(format!("{} = {counts}", wheel.name()))
         });
         let counts: Vec<_> = counts.collect();
         writeln!(text, "\n[encoders]\ncounts_per_revolution = {{ {} }}", counts.join(", "))?;
@@ -90,4 +91,22 @@ fn uncertain(text: &mut String, uncertainty: &Uncertainty) -> core::fmt::Result 
         writeln!(text, "{id}.{name} = {deviation:?}")?;
     }
     Ok(())
+}
+
+/// What is known of a run beside its files.
+#[must_use]
+pub fn run_text(rows: &Rows) -> String {
+    let mut text = format!("name = \"{}\"\nmanoeuvre = \"{}\"\n", rows.name, rows.manoeuvre);
+    // Writing to a string never fails.
+    if let Some(of) = &rows.repeat_of {
+        let _ = writeln!(text, "repeat_of = \"{of}\"");
+    }
+    if let Some(distance) = rows.distance {
+        let _ = writeln!(text, "distance = {distance:.3}");
+    }
+    if let Some(start) = rows.start {
+        let (x, y, yaw) = (start.x, start.y, start.yaw);
+        let _ = write!(text, "\n[start]\nx = {x:.3}\ny = {y:.3}\nyaw = {yaw:.4}\n");
+    }
+    text
 }

@@ -210,13 +210,14 @@ fn build(dice: &mut Dice, vehicle: &Vehicle) -> Build {
         mass: 15.0 * size * size * size * dice.between(0.5, 1.0),
         gyration: dice.between(0.42, 0.52),
         centre_of_mass: dice.between(0.4, 0.56),
-        lateral_compliance: [rear * dice.between(1.0, 1.1), rear],
+        lateral_compliance: [rear * dice.between(1.0, 1.05), rear],
         longitudinal_compliance: dice.between(0.01, 0.03),
         friction: dice.between(0.7, 1.0),
         rolling_resistance: dice.between(0.005, 0.015),
         ackermann: dice.between(0.97, 1.0),
-        linkage: dice.between(0.0, 0.0015) / (vehicle.limits.acceleration / 0.3),
+        linkage: dice.between(0.0, 0.001) / (vehicle.limits.acceleration / 0.3),
         toe: dice.between(-0.0005, 0.001),
+        gyro_latency: dice.between(0.0, 0.0025),
     }
 }
 

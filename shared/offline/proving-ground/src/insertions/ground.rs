@@ -45,7 +45,7 @@ pub(crate) struct Ground {
 
 /// Where the car is and what motor and rack do, at one instant.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Instant {
+pub(crate) struct Present {
     /// \[s\].
     pub(crate) time: f64,
     /// Of the rear-axle centre \[m\].
@@ -156,7 +156,7 @@ impl Ground {
     }
 
     /// How far the front wheels stand askew of the rack, the linkage's bend left out \[rad\].
-    pub(crate) fn askew(&self, now: &Instant) -> f64 {
+    pub(crate) fn askew(&self, now: &Present) -> f64 {
         let mut angle = self.offset;
         if now.speed != 0.0 {
             angle += self.offset_by_direction * now.speed.signum();
@@ -173,7 +173,7 @@ impl Ground {
     }
 
     /// What the driven wheels turn beyond rolling: 1 - the share of their rotation that moves the car.
-    pub(crate) fn slip(&self, now: &Instant) -> f64 {
+    pub(crate) fn slip(&self, now: &Present) -> f64 {
         let mut grip = 1.0 - self.drive_slip;
         let gaining = now.acceleration * now.speed > 0.0;
         let creep = self.acceleration_slip * now.acceleration.abs();
@@ -191,7 +191,7 @@ impl Ground {
     }
 
     /// Radii on which the wheels roll now \[m\], of those that they have.
-    pub(crate) fn radius(&self, radius: [f64; 4], now: &Instant) -> [f64; 4] {
+    pub(crate) fn radius(&self, radius: [f64; 4], now: &Present) -> [f64; 4] {
         core::array::from_fn(|i| {
             let wobble = match self.out_of_round[i] {
                 0.0 => 0.0,
@@ -202,7 +202,7 @@ impl Ground {
     }
 
     /// Velocity beside what the wheels roll: sideways in the body frame, and along x and y of the ground \[m/s\].
-    pub(crate) fn sideways(&self, motion: &Motion, now: &Instant) -> (f64, f64, f64) {
+    pub(crate) fn sideways(&self, motion: &Motion, now: &Present) -> (f64, f64, f64) {
         let speed = motion.forward.abs();
         let mut side = -self.lateral_slip * motion.forward * motion.yaw_rate;
         side += self.lateral_drift * speed;

@@ -22,7 +22,7 @@ mod unlisted;
 use crate::cases::Specification;
 
 pub use effect::{Definition, Effect, Link, Parameter, Role, Unit, merged};
-pub(crate) use ground::{Ground, Instant};
+pub(crate) use ground::{Ground, Present};
 pub use listed::LISTED;
 pub use measure::{Measured, measured};
 pub(crate) use reference::Sight;

@@ -1,5 +1,6 @@
 //! Tests of the cases, on noise-free signals where nothing is said of noise.
 
+mod literal;
 mod signatures;
 
 use kerbside_geometry::{WHEELS, math};
@@ -160,6 +161,16 @@ fn rows_are_as_a_recorder_writes_them() {
             }
             let ideal = case.record(plan, true, Errors::None);
             assert_eq!(ideal, case.record(plan, true, Errors::None));
+            let unwrapped = case.record(plan, true, Errors::Unwrapped(0));
+            for (shown, exact) in unwrapped.counts.iter().zip(&ideal.counts) {
+                let pairs = shown.value.into_iter().zip(exact.value);
+                let off = pairs.filter_map(|(shown, exact)| Some((shown? - exact?).abs()));
+                // Disturbances of a few thousandths.
+                assert!(
+                    off.fold(0.0, f64::max)
+                        < 5.0 + 0.02 * exact.value[0].or(exact.value[2]).unwrap_or(0.0).abs()
+                );
+            }
             let white = case.specification.floor.steering;
             if !rows.steering.is_empty() {
                 let off = rows.steering.iter().zip(&ideal.steering);
@@ -239,4 +250,27 @@ fn sizes_occur_from_small_to_large_and_stay_in_range() {
         inside as f64 / shares.len() as f64
     };
     assert!(part(0.0, 0.12) > 0.2 && part(0.12, 0.3) > 0.2 && part(0.3, 1.0) > 0.2);
+}
+
+#[test]
+fn a_series_has_its_shares_and_every_effect() {
+    let series = series(5, 100, |request| Request { runs: 2, holdout: 1, ..request });
+    assert_eq!(series.len(), 100);
+    let of = |kind: Kind| series.iter().filter(|case| case.1.kind == kind).count();
+    let kinds = [Kind::Single, Kind::Pair, Kind::Null, Kind::Unknown];
+    assert_eq!(kinds.map(of), [40, 18, 20, 22]);
+    for (table, kind) in [(LISTED, Kind::Single), (UNLISTED, Kind::Unknown)] {
+        for known in table {
+            let there = |case: &&(u64, Request)| case.1.kind == kind && case.1.ids == [known.id];
+            assert!(series.iter().any(|case| there(&case)), "{}", known.id);
+        }
+    }
+    for (seed, request) in series.iter().take(20) {
+        let case = Case::of(*seed, request).expect("it was tried");
+        let first = case.specification.effects.first().map(|effect| effect.id);
+        assert_eq!(first, request.ids.first().copied());
+    }
+    // The first half is no more of one kind than the second.
+    let half = |kind: Kind| series[..50].iter().filter(|case| case.1.kind == kind).count();
+    assert!(kinds.iter().all(|kind| half(*kind).abs_diff(of(*kind) / 2) <= 8));
 }

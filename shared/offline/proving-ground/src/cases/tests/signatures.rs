@@ -194,3 +194,43 @@ fn what_acts_by_side_force_is_labelled_as_measured() {
     let case = one(1, Kind::Single, "drive_slip", 0.6).expect("every car has it").specification;
     assert_eq!(measured(&case, "drive_slip", "ratio"), None);
 }
+
+#[test]
+fn the_plant_of_held_commands_drives_the_same_way() {
+    use crate::{Actuators, Command, Plant};
+    let mut case = equipped(71, Kind::Null, "", 0.0);
+    // Where the rear wheels drive and are as believed, both take a command in the same sense.
+    let specification = &mut case.specification;
+    specification.vehicle.drive = kerbside_geometry::Drive::Rear;
+    specification.truth.drive = kerbside_geometry::Drive::Rear;
+    specification.truth.radius = specification.vehicle.radius;
+    let (limits, response) = (specification.truth.limits, specification.truth.response());
+    let mut physics = crate::car::physics(specification);
+    physics.actuators = Actuators {
+        speed_delay: response.speed_delay,
+        speed_lag: response.speed_lag,
+        acceleration_limit: limits.acceleration,
+        droop: 0.0,
+        steering_delay: response.steering_delay,
+        steering_lag: response.steering_lag,
+        steering_rate_limit: limits.steering_rate,
+        steering_limit: limits.steering,
+    };
+    let chassis = crate::car::chassis(specification);
+    let plan = &mut specification.runs[0];
+    plan.stamps.reference = vec![plan.duration];
+    let plan = plan.clone();
+    let mut plant = Plant::new(&chassis, &physics, plan.start, 0.0);
+    plant.step(plan.commands[0].time, Command::default());
+    for (k, row) in plan.commands.iter().enumerate() {
+        let end = plan.commands.get(k + 1).map_or(plan.duration, |next| next.time);
+        plant.step(end - row.time, Command { speed: row.speed, steering: row.steering });
+    }
+    let end = signals(&case, &[], 0).reference[0];
+    let marker = case.specification.vehicle.reference.expect("a reference").marker;
+    let other = plant.state().pose.compose(&marker);
+    assert!(plan.start.distance(&plant.state().pose) > 0.1);
+    let size = case.specification.vehicle.wheelbase;
+    assert!(end.distance(&other) < 2e-4 * size, "{end:?} against {other:?}");
+    assert!((end.yaw - other.yaw).abs() < 2e-4);
+}
