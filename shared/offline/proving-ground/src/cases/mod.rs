@@ -16,6 +16,7 @@
 //! println!("{}", case.label().text());
 //! ```
 
+mod deviations;
 mod dice;
 mod floor;
 mod label;

@@ -56,7 +56,7 @@ pub const UNLISTED: &[Definition] = &[
         "shimmy",
         Link::Ground,
         &[
-            size("amplitude", 0.0, 0.02, 0.1, Unit::Plain),
+            size("amplitude", 0.0, 0.03, 0.1, Unit::Plain),
             other("speed", 0.25, 0.4, Unit::Speed, Role::Free),
             other("frequency", 1.0, 2.5, Unit::Plain, Role::Free),
         ],
@@ -66,14 +66,14 @@ pub const UNLISTED: &[Definition] = &[
     effect(
         "offset_by_direction",
         Link::Ground,
-        &[size("offset", 0.0, 0.005, 0.04, Unit::Plain)],
+        &[size("offset", 0.0, 0.008, 0.04, Unit::Plain)],
         "the wheels stand {offset} rad to the left of the rack when driving forwards and \
          as much to the right in reverse",
     ),
     effect(
         "brake_pull",
         Link::Ground,
-        &[size("angle", 0.0, 0.01, 0.08, Unit::Plain)],
+        &[size("angle", 0.0, 0.02, 0.08, Unit::Plain)],
         "one brake grips first: when slowing down at the limit the wheels are turned by \
          {angle} rad to the left",
     ),
@@ -105,7 +105,7 @@ pub const UNLISTED: &[Definition] = &[
         "floor_wave",
         Link::Ground,
         &[
-            size("rate", 0.0, 0.01, 0.08, Unit::Plain),
+            size("rate", 0.0, 0.02, 0.08, Unit::Plain),
             other("length", 1.0, 2.5, Unit::Length, Role::Free),
         ],
         "the floor is wavy: a side velocity of {rate} of the speed that changes its sign \
@@ -115,7 +115,7 @@ pub const UNLISTED: &[Definition] = &[
         "gyro_warming",
         Link::Sensing,
         &[
-            size("bias", 0.0, 0.005, 0.04, Unit::Plain),
+            size("bias", 0.0, 0.01, 0.04, Unit::Plain),
             other("time", 3.0, 10.0, Unit::Plain, Role::Free),
         ],
         "the gyro warms up: a bias of {bias} rad/s comes up within a time constant of \
@@ -124,13 +124,13 @@ pub const UNLISTED: &[Definition] = &[
     effect(
         "gyro_vibration",
         Link::Sensing,
-        &[size("bias", 0.0, 0.005, 0.04, Unit::Plain)],
+        &[size("bias", 0.0, 0.01, 0.04, Unit::Plain)],
         "vibration: the gyro has a bias of {bias} rad/s at the top speed, in proportion \
          to the speed in either direction",
     ),
     of_wheel(
         "encoder_eccentricity",
-        &[size("angle", 0.0, 0.02, 0.15, Unit::Plain)],
+        &[size("angle", 0.0, 0.05, 0.15, Unit::Plain)],
         Link::Sensing,
         "the disc of the {wheel} encoder sits off its axle: it shows up to {angle} rad \
          too much or too little, once a turn",

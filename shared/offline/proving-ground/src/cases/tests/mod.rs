@@ -274,3 +274,27 @@ fn a_series_has_its_shares_and_every_effect() {
     let half = |kind: Kind| series[..50].iter().filter(|case| case.1.kind == kind).count();
     assert!(kinds.iter().all(|kind| half(*kind).abs_diff(of(*kind) / 2) <= 8));
 }
+
+#[test]
+fn each_deviation_is_seen_and_is_small() {
+    let case = equipped(91, Kind::Single, "steering_offset", 0.5);
+    let deviations = case.deviations();
+    let names: Vec<_> = deviations.iter().map(|(name, _)| name.as_str()).collect();
+    let all = case.specification.uncertainty.fields.len()
+        + 3
+        + case.specification.uncertainty.effects.len();
+    assert_eq!(names.len(), all - 1, "one of them is put in: {names:?}");
+    assert!(names.contains(&"radius.fr") && !names.contains(&"steering_offset.offset"));
+    let acting = |case: &Case, run: usize| {
+        let plan = &case.specification.runs[run];
+        signals(case, &case.acting(plan, true, Errors::None), run)
+    };
+    let size = case.specification.vehicle.wheelbase;
+    for (name, other) in &deviations {
+        let most = (0..4).map(|run| difference(&case, &acting(other, run), &acting(&case, run)));
+        let most =
+            most.fold([0.0_f64; 5], |most, apart| core::array::from_fn(|i| most[i].max(apart[i])));
+        assert!(most.iter().any(|apart| *apart > 1e-5), "{name}: {most:?}");
+        assert!(most[4] < 0.3 * size && most[2] < 0.02, "{name}: {most:?}");
+    }
+}
