@@ -58,6 +58,14 @@ impl Chassis {
         }
     }
 
+    /// Mean radius of the driven wheels \[m\].
+    pub(crate) fn driven_radius(&self) -> f64 {
+        let driven = WHEELS.into_iter().filter(|wheel| self.is_driven(*wheel));
+        let (sum, count) =
+            driven.fold((0.0, 0.0), |(sum, n), wheel| (sum + self.radius[wheel.index()], n + 1.0));
+        sum / count
+    }
+
     /// Force with which a wheel presses on the level ground at rest \[N\].
     #[must_use]
     pub fn load(&self, wheel: Wheel) -> f64 {

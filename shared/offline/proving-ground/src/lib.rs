@@ -21,6 +21,11 @@
 //! - [`TestDrive`] makes a [`Recorded`] of all this: what a run's folder would hold, and the truth. What was
 //!   [`Driven`] once can be recorded with many seeds.
 //!
+//! **Cases.** [`cases`] draws whole cases for judging a diagnosis: vehicles of all sizes, what their descriptions say, what
+//! is put into them ([`insertions`]: every effect that a diagnosis may name, and others) and drives from a [`library`] of
+//! manoeuvres. There the motor turns at the commanded rate whatever the wheels' true radii are, and any other plant may
+//! drive the same case.
+//!
 //! **Kinematic limit.** With [`Physics::NEUTRAL`] the car rolls ideally: held commands are exact arcs, paths are covered
 //! exactly (the heading is the exact integral of the curvature), and the integrated vehicle agrees with both. Every
 //! term of the physics can be neutral on its own.
@@ -42,12 +47,16 @@
 
 mod actuators;
 mod balance;
+mod car;
+pub mod cases;
 mod chassis;
 mod colour;
 mod contact;
 mod drive;
+pub mod insertions;
 mod instruments;
 mod leg;
+pub mod library;
 mod manoeuvre;
 mod normal;
 mod paper;

@@ -83,6 +83,8 @@ pub(crate) struct Contacts {
     /// The largest compliance, by which the balance is scaled.
     scale: f64,
     wheels: [Contact; 4],
+    /// Mean rotation rate of the driven wheels per unit of commanded speed \[rad/m\]; none: what ideal rolling needs.
+    motor: Option<f64>,
     /// The last solution and its direction of travel: where the next one begins.
     last: Option<(f64, [f64; UNKNOWNS])>,
 }
@@ -114,8 +116,16 @@ impl Contacts {
             bends: !tyres.are_rigid() && physics.linkage.compliance > 0.0,
             scale: lateral[0].max(lateral[1]).max(longitudinal),
             wheels: WHEELS.map(contact),
+            motor: None,
             last: None,
         }
+    }
+
+    /// Lets the wheels roll on these radii \[m\] from now on, and the motor turn the driven ones by `motor` \[rad\] in the
+    /// mean per metre of commanded speed, whatever the body makes of it.
+    pub(crate) fn set_rolling(&mut self, radius: [f64; 4], motor: f64) {
+        self.wheels.iter_mut().zip(radius).for_each(|(wheel, radius)| wheel.radius = radius);
+        self.motor = Some(motor);
     }
 
     /// The motion that motor and rack bring about.
@@ -127,7 +137,8 @@ impl Contacts {
         if self.ideal {
             let load = -self.inertia(drivetrain, unit, unit.forward, unit.yaw)[FORWARD];
             let speed = self.drooped(drivetrain, load);
-            return self.rolling(speed, unit);
+            let needed = self.motor_rate(1.0, unit);
+            return self.rolling(self.motor.map_or(speed, |motor| speed * motor / needed), unit);
         }
         self.balanced(drivetrain, unit)
     }
@@ -184,7 +195,7 @@ impl Contacts {
         let force = |z: &[f64; UNKNOWNS]| {
             self.inertia(drivetrain, unit, direction * z[FORWARD], direction * z[YAW])
         };
-        let motor = self.motor_rate(direction, unit);
+        let motor = self.motor.map_or_else(|| self.motor_rate(direction, unit), |m| direction * m);
         let begin = [direction * unit.forward, 0.0, direction * unit.yaw, 0.0, 0.0, 0.0, 0.0];
         let mut z = self.last.filter(|last| last.0 == direction).map_or(begin, |last| last.1);
         let headings =
