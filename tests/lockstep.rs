@@ -203,3 +203,25 @@ fn a_process_that_keeps_dying_is_given_up() {
     let (run, verdict) = drive(&["garage", "--rearm"], 1, Script { kills, ..Script::default() });
     assert_eq!(run.end, End::Stopped(Cause::GaveUp), "{}", verdict.cause);
 }
+
+#[test]
+fn effects_of_an_overlay_show_in_how_the_car_parks() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("model.toml");
+    let text = "[[effect]]\nid = \"steering_offset\"\noffset = 0.05\n\n\
+                [[effect]]\nid = \"radius_scale\"\nscale = 1.04\n";
+    std::fs::write(&file, text).unwrap();
+    let words = ["garage", "--effects", file.to_str().unwrap()];
+    let job = job_of(&words, 1);
+    assert!(job.command_line.contains("--effects") && job.configuration.len() == 4);
+    let (with, told) = drive(&words, 1, Script::default());
+    let (without, nominal) = drive(&["garage"], 1, Script::default());
+    let way = |run: &Run| run.trace.truth.last().unwrap().distance;
+    let believed = |verdict: &Verdict| {
+        let estimate = verdict.estimate_error.unwrap();
+        estimate.x.hypot(estimate.y)
+    };
+    // Wheels that are larger than described roll farther than the odometry believes.
+    assert!(way(&with) > 1.02 * way(&without), "{} {}", way(&with), way(&without));
+    assert!(believed(&told) > believed(&nominal) + 0.02, "{told:?} {nominal:?}");
+}

@@ -29,6 +29,7 @@ pub mod recorder;
 pub mod replay;
 pub mod reproduce;
 pub mod service;
+pub mod simulate;
 pub mod supervisor;
 pub mod tables;
 pub mod tracker;

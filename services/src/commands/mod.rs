@@ -19,6 +19,7 @@ use crate::park::ParkArgs;
 use crate::replay::ReplayArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::service::{Service, ServiceArgs};
+use crate::simulate::SimulateArgs;
 use crate::vehicle::VehicleArgs;
 use crate::{
     actuation, estimator, ingest, interface, logging, park, planner, recorder, tracker, vehicle,
@@ -75,6 +76,11 @@ enum Verb {
     /// Identify radii, tracks, wheelbase and steering offset from recorded runs, and write them down.
     #[command(after_help = "Example: kerbside calibrate CASE --leave-out straight-5,circle-5")]
     Calibrate(CalibrateArgs),
+    /// Predict from commands what every sensor of recorded runs shows, with effects added to the vehicle or without.
+    #[command(
+        after_help = "Example: kerbside simulate CASE --runs CASE/holdout --model overlay.toml --out /tmp/after"
+    )]
+    Simulate(SimulateArgs),
     /// Repeat the paper's experiments on the proving ground, and hold them against what they are to show.
     #[command(after_help = "Example: kerbside reproduce --trials 400 --out /tmp/paper")]
     Reproduce(ReproduceArgs),
@@ -147,6 +153,10 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
         Verb::Calibrate(args) => {
             logging::start("calibrate", level.unwrap_or("warn"), false);
             crate::calibrate::run(args)
+        }
+        Verb::Simulate(args) => {
+            logging::start("simulate", level.unwrap_or("warn"), false);
+            crate::simulate::run(args)
         }
         Verb::Reproduce(args) => {
             logging::start("reproduce", level.unwrap_or("warn"), false);

@@ -53,6 +53,7 @@ fn one_scene(
         runs,
         rearm: false,
         vehicle: None,
+        effects: None,
         config: None,
         instance: None,
         out: None,
