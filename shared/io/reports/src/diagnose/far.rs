@@ -6,8 +6,8 @@ use super::data::{DiagnoseReport, plain, points};
 use crate::format::{percent, significant, with_unit};
 use crate::page::{Block, Section};
 use crate::svg::{
-    Band, Bar, BarRow, Cell, Chart, Figure, Ink, Legend, Line, Map, Panel, Range, RowWeight, Rows,
-    Ticks, Trace,
+    Band, Bar, BarRow, Cell, Chart, Cloud, Figure, Ink, Legend, Line, Map, Panel, Range, RowWeight,
+    Rows, Ticks, Trace,
 };
 
 /// Runs drawn, at most.
@@ -21,10 +21,12 @@ impl DiagnoseReport {
         let diagnosis = &self.diagnosis;
         let mut blocks: Vec<Block> =
             diagnosis.gap.iter().map(|gap| Block::Figure(self.waterfall(gap))).collect();
-        blocks.extend(self.horizons().map(|figure| Block::Beside(vec![Block::Figure(figure)])));
+        let curves = [self.horizons(), self.circumstance()];
+        let curves: Vec<Block> = curves.into_iter().flatten().map(Block::Figure).collect();
+        blocks.extend((!curves.is_empty()).then_some(Block::Beside(curves)));
         let drawn = self.drawn(DRAWN);
         let more = diagnosis.paths.len() - drawn.len();
-        blocks.extend(drawn.iter().enumerate().map(|(number, run)| run_figures(run, number)));
+        blocks.extend(drawn.iter().enumerate().map(|(number, run)| self.run_figures(run, number)));
         if blocks.is_empty() {
             return None;
         }
@@ -71,6 +73,35 @@ impl DiagnoseReport {
         figure.with_caption(removed(gap))
     }
 
+    /// The residual against the circumstance that matters, before and after.
+    fn circumstance(&self) -> Option<Figure> {
+        let plot = self.diagnosis.plot.as_ref()?;
+        let side = |after: bool| {
+            let points = plot.points.iter();
+            points.map(|(x, before, left)| [*x, if after { *left } else { *before }]).collect()
+        };
+        let cloud = |label: &str, line: Line, points: Vec<[f64; 2]>| Cloud {
+            label: label.to_owned(),
+            ink: line.ink,
+            points,
+        };
+        let mut clouds = vec![cloud("nominal vehicle", NOMINAL, side(false))];
+        if !self.diagnosis.effects.is_empty() {
+            clouds.push(cloud("with the effects", AFTER, side(true)));
+        }
+        let chart = Chart {
+            id: "circumstance".to_owned(),
+            title: "The residual where it matters".to_owned(),
+            description: format!("{} against {}, before and after.", plot.signal, plot.axis),
+            x_title: plot.axis.clone(),
+            y_title: plot.signal.clone(),
+            clouds,
+            limits: vec![0.0],
+            ..Chart::default()
+        };
+        Some(chart.figure())
+    }
+
     /// Error against horizon, on logarithmic axes.
     fn horizons(&self) -> Option<Figure> {
         let positive = |value: &f64| *value > 0.0 && value.is_finite();
@@ -103,6 +134,46 @@ impl DiagnoseReport {
             ..Chart::default()
         };
         Some(chart.figure())
+    }
+
+    /// Paths from above, and the distance from the measured one over time.
+    fn run_figures(&self, run: &RunPaths, number: usize) -> Block {
+        let has_effects = !self.diagnosis.effects.is_empty();
+        let description =
+            format!("Paths of {}: measured, nominal, and with the effects.", run.name);
+        let mut map = Map::small(&format!("path-{number}"), &run.name, &description, "m");
+        let lines = [
+            ("measured", MEASURED, &run.measured),
+            ("nominal vehicle", NOMINAL, &run.nominal),
+            ("with the effects", AFTER, &run.after),
+        ];
+        for (label, line, path) in lines {
+            if !path.is_empty() && (line != AFTER || has_effects) {
+                map.path(points(path), line);
+                map.explain(Legend::line(label, line));
+            }
+        }
+        let map = Block::Figure(map.figure());
+        if run.errors.is_empty() {
+            return Block::Beside(vec![map]);
+        }
+        let nominal = run.errors.iter().map(|(t, nominal, _)| [*t, *nominal]).collect();
+        let after = run.errors.iter().map(|(t, _, after)| [*t, *after]).collect();
+        let mut traces = vec![trace("nominal vehicle", NOMINAL, nominal)];
+        if has_effects && !run.after.is_empty() {
+            traces.push(trace("with the effects", AFTER, after));
+        }
+        let chart = Chart {
+            id: format!("error-{number}"),
+            title: format!("{}, distance from the measured path", run.name),
+            description: format!("Distance of {} from the measured path over time.", run.name),
+            x_title: "time [s]".to_owned(),
+            y_title: "distance [m]".to_owned(),
+            traces,
+            limits: vec![0.0],
+            ..Chart::default()
+        };
+        Block::Beside(vec![map, Block::Figure(chart.figure())])
     }
 }
 
@@ -146,42 +217,4 @@ fn removed(gap: &Shrinkage) -> String {
         ),
         None => format!("There is too little to explain for a share to mean anything. {yaw}"),
     }
-}
-
-/// Paths from above, and the distance from the measured one over time.
-fn run_figures(run: &RunPaths, number: usize) -> Block {
-    let description = format!("Paths of {}: measured, nominal, and with the effects.", run.name);
-    let mut map = Map::small(&format!("path-{number}"), &run.name, &description, "m");
-    let lines = [
-        ("measured", MEASURED, &run.measured),
-        ("nominal vehicle", NOMINAL, &run.nominal),
-        ("with the effects", AFTER, &run.after),
-    ];
-    for (label, line, path) in lines {
-        if !path.is_empty() {
-            map.path(points(path), line);
-            map.explain(Legend::line(label, line));
-        }
-    }
-    let map = Block::Figure(map.figure());
-    if run.errors.is_empty() {
-        return Block::Beside(vec![map]);
-    }
-    let nominal = run.errors.iter().map(|(t, nominal, _)| [*t, *nominal]).collect();
-    let after = run.errors.iter().map(|(t, _, after)| [*t, *after]).collect();
-    let mut traces = vec![trace("nominal vehicle", NOMINAL, nominal)];
-    if !run.after.is_empty() {
-        traces.push(trace("with the effects", AFTER, after));
-    }
-    let chart = Chart {
-        id: format!("error-{number}"),
-        title: format!("{}, distance from the measured path", run.name),
-        description: format!("Distance of {} from the measured path over time.", run.name),
-        x_title: "time [s]".to_owned(),
-        y_title: "distance [m]".to_owned(),
-        traces,
-        limits: vec![0.0],
-        ..Chart::default()
-    };
-    Block::Beside(vec![map, Block::Figure(chart.figure())])
 }

@@ -17,6 +17,8 @@ const STEPS: [(f64, Ink, &str); 4] = [
 const ASTRAY: f64 = 2.0;
 /// Arrows keep this share of the map's size from one another.
 const APART: f64 = 0.035;
+/// Height of the map, in figure units: the chain and the map fit one screen.
+const TALLEST: f64 = 330.0;
 /// Points farther apart than this share of the map's size belong to no common line.
 const HOLE: f64 = 0.25;
 
@@ -37,6 +39,7 @@ impl DiagnoseReport {
                            arrows point to where the vehicle went astray.";
         let mut map = Map::new("map", title, description);
         map.show(x.at_least(0.2 * size).padded(0.05), y.at_least(0.2 * size).padded(0.05));
+        map.keep_within(TALLEST);
         for run in runs {
             if run.map.is_empty() {
                 map.path(points(&run.measured), Line::new(Ink::Grey).thin());
@@ -45,7 +48,9 @@ impl DiagnoseReport {
         // What is worst lies on top.
         for (step, (_, ink, _)) in STEPS.iter().enumerate() {
             for run in runs {
-                map.path(pieces(&run.map, step, HOLE * size), Line::new(*ink).wide());
+                let line = pieces(&run.map, step, HOLE * size);
+                map.path(line.clone(), Line::new(*ink).wide());
+                map.path(line, Line::new(*ink));
             }
         }
         for arrow in arrows(all(), APART * size) {

@@ -63,7 +63,8 @@ impl DiagnoseReport {
         let metres = |value: Option<f64>| {
             format::optional(value, |value| with_unit(&significant(value, 3), "m"))
         };
-        let removed = gap.and_then(|gap| gap.removed);
+        let has_effects = !diagnosis.effects.is_empty();
+        let removed = gap.and_then(|gap| gap.removed).filter(|_| has_effects);
         let between = removed.map_or_else(
             || "of the explainable gap".to_owned(),
             |removed| {
@@ -71,13 +72,14 @@ impl DiagnoseReport {
             },
         );
         let regime = match diagnosis.regime.as_str() {
-            "" => "where in the chain",
+            "" if links.is_empty() => "no link is beyond what is allowed",
+            "" => "in the chain from command to reference",
             regime => regime,
         };
         vec![
             KeyFigure::plain("Where", capital(&place), regime),
             KeyFigure::plain("Cause", capital(&self.cause()), &self.cause_note()),
-            KeyFigure::plain("Probability", self.probability(), "that this is the whole cause"),
+            KeyFigure::plain("Probability", self.probability(), "of this answer"),
             KeyFigure::plain(
                 "Gap removed",
                 format::optional(removed.map(|r| r.value), percent),
@@ -88,7 +90,11 @@ impl DiagnoseReport {
                 metres(gap.map(|gap| gap.before)),
                 "position, rms along the way",
             ),
-            KeyFigure::plain("Error after", metres(gap.map(|gap| gap.after)), "with the effects"),
+            KeyFigure::plain(
+                "Error after",
+                metres(gap.filter(|_| has_effects).map(|gap| gap.after)),
+                "with the effects",
+            ),
             KeyFigure::plain(
                 "Noise alone",
                 metres(gap.map(|gap| gap.floor)),

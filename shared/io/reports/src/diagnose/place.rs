@@ -5,9 +5,7 @@ use kerbside_diagnosis::LinkGap;
 use super::data::{DiagnoseReport, plain, way};
 use crate::format::{self, significant, with_unit};
 use crate::page::{Block, Row, Section, Table};
-use crate::svg::{
-    Bar, BarRow, Cell, Chart, Cloud, Figure, Ink, Legend, Panel, Range, RowWeight, Rows, Tone,
-};
+use crate::svg::{Bar, BarRow, Cell, Figure, Ink, Legend, Panel, Range, RowWeight, Rows, Tone};
 
 /// How far the axis of the chain goes at least, and at most, in what noise and a car in good order explain.
 const REACH: [f64; 2] = [3.0, 60.0];
@@ -28,7 +26,9 @@ impl DiagnoseReport {
             .with_rows(diagnosis.links.iter().map(|gap| self.link_row(gap)));
         let mut blocks = vec![Block::Figure(self.chain())];
         blocks.extend(self.map().map(Block::Figure));
-        blocks.extend(self.circumstances());
+        if !diagnosis.regime.is_empty() {
+            blocks.push(Block::Text(format!("The gap shows {}.", diagnosis.regime)));
+        }
         blocks.push(Block::Table(table));
         Section::new("where", "Where the gap lies", blocks).with_lead(
             "Each link is fed with what was measured before it, and asked for what was measured after it. \
@@ -100,17 +100,9 @@ impl DiagnoseReport {
             bars.push(if self.is_named(gap) { bar } else { bar.pale() });
         }
         let interval = [1.0 + share(gap.low), 1.0 + share(gap.high)];
-        let words = format!(
-            "{} of {}",
-            significant(gap.gap, 2),
-            with_unit(&format!("{} allowed", significant(allowed, 2)), "")
-        );
-        Cell {
-            bars,
-            whisker: (gap.high > 0.0).then_some(interval),
-            dots: Vec::new(),
-            words: with_unit(&words, gap.unit),
-        }
+        let gap_words = with_unit(&significant(gap.gap, 2), gap.unit);
+        let words = format!("{gap_words}, {} allowed", significant(gap.floor + gap.allowance, 2));
+        Cell { bars, whisker: (gap.high > 0.0).then_some(interval), dots: Vec::new(), words }
     }
 
     fn link_row(&self, gap: &LinkGap) -> Row {
@@ -130,43 +122,6 @@ impl DiagnoseReport {
             format::interval([gap.excess, gap.low, gap.high]),
         ]);
         if self.is_named(gap) { row.toned(Tone::Bad) } else { row }
-    }
-
-    /// In which circumstances the gap shows, in words and drawn.
-    fn circumstances(&self) -> Option<Block> {
-        let diagnosis = &self.diagnosis;
-        let words = match diagnosis.regime.as_str() {
-            "" => String::new(),
-            regime => format!("The gap shows {regime}."),
-        };
-        let Some(plot) = &diagnosis.plot else {
-            return (!words.is_empty()).then_some(Block::Text(words));
-        };
-        let side = |after: bool| {
-            let pick =
-                |(x, before, left): &(f64, f64, f64)| [*x, if after { *left } else { *before }];
-            plot.points.iter().map(pick).collect()
-        };
-        let cloud = |label: &str, ink: Ink, points: Vec<[f64; 2]>| Cloud {
-            label: label.to_owned(),
-            ink,
-            points,
-        };
-        let chart = Chart {
-            id: "regime".to_owned(),
-            title: format!("{} against {}", capital(&plot.signal), plot.axis),
-            description: "The residual against the circumstance that matters, before and after."
-                .to_owned(),
-            x_title: plot.axis.clone(),
-            y_title: plot.signal.clone(),
-            clouds: vec![
-                cloud("nominal vehicle", Ink::Orange, side(false)),
-                cloud("with the effects", Ink::Blue, side(true)),
-            ],
-            limits: vec![0.0],
-            ..Chart::default()
-        };
-        Some(Block::Beside(vec![Block::Figure(chart.figure()), Block::Text(words)]))
     }
 }
 

@@ -148,7 +148,7 @@ impl Rows {
         let height = TOP + ROW * self.rows.len() as f64 + BELOW;
         let mut canvas = Canvas::default();
         let (id, title, description) = (&self.id, &self.title, &self.description);
-        Frame { id, class: "map", title, description, width: WIDTH, height }.open(&mut canvas);
+        Frame { id, class: "rows", title, description, width: WIDTH, height }.open(&mut canvas);
         let columns = self.columns();
         for (panel, column) in self.panels.iter().zip(&columns) {
             self.draw_axis(&mut canvas, panel, column);
