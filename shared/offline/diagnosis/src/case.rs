@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use kerbside_geometry::{Pose, Vehicle};
-use crate::Command;
+use kerbside_simulation::Command;
 
 /// Rows of one sensor: strictly increasing stamps \[s\] and their values; a value that is missing is NaN.
 #[derive(Clone, Debug, PartialEq)]

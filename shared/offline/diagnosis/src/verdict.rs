@@ -1,6 +1,6 @@
 //! What a diagnosis says.
 
-use crate::Link;
+use kerbside_simulation::effects::Link;
 
 /// The answer in one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

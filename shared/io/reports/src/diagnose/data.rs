@@ -1,6 +1,7 @@
 //! What the report of a diagnosis is made from.
 
-use kerbside_diagnosis::{Diagnosis, Link, RunPaths};
+use kerbside_diagnosis::{Diagnosis, RunPaths};
+use kerbside_simulation::effects::Link;
 
 use crate::Provenance;
 

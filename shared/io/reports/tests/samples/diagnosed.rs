@@ -1,11 +1,12 @@
 //! Made-up diagnoses of every verdict.
 
 use kerbside_diagnosis::{
-    Alternative, Diagnosis, FoundEffect, FoundParameter, Interval, Link, LinkGap, MapPoint,
-    Mistake, Next, RegimePlot, Rival, RunPaths, Shrinkage, Verdict,
+    Alternative, Diagnosis, FoundEffect, FoundParameter, Interval, LinkGap, MapPoint, Mistake,
+    Next, RegimePlot, Rival, RunPaths, Shrinkage, Verdict,
 };
 use kerbside_geometry::{Pose, math};
 use kerbside_reports::DiagnoseReport;
+use kerbside_simulation::effects::Link;
 
 use super::{Noise, WHEELBASE, provenance};
 
