@@ -148,15 +148,16 @@ fn take<'a>(next: &AtomicUsize, jobs: &'a [Job]) -> Option<(usize, &'a Job)> {
 fn one(args: &DiagnoseArgs, job: &Job, diagnoser: &Diagnoser<'_>) -> Done {
     let model = args.model();
     let found = |result, kept| Done { row: Row { case: job.name.clone(), result }, kept };
-    if let Some(document) = files::kept(&job.out, model).filter(|_| !args.fresh) {
+    if let Some(document) = files::kept(&job.out, model.as_deref()).filter(|_| !args.fresh) {
         return found(Ok(document), true);
     }
     // A defect that shows in one case must not cost the others.
     let result = catch_unwind(AssertUnwindSafe(|| {
-        let diagnosed = super::diagnosed(&job.case, model, diagnoser, &|_, _| {})?;
+        let diagnosed = super::diagnosed(&job.case, model.clone(), diagnoser, &|_, _| {})?;
         files::write(&job.out, &diagnosed, &args.command_line(&job.case))?;
         // The table is of what is on the disk, now and when it is kept.
-        files::kept(&job.out, model).ok_or_else(|| Failure::internal("it cannot be read again"))
+        files::kept(&job.out, model.as_deref())
+            .ok_or_else(|| Failure::internal("it cannot be read again"))
     }));
     let defect = |_| Err(Failure::internal("a defect of kerbside; it is told above"));
     let result = result.unwrap_or_else(defect).map_err(|failure| words(&failure));

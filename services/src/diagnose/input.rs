@@ -5,11 +5,11 @@ use std::path::Path;
 
 use kerbside_diagnosis::{Allowance, Case, Run, Series, Wheels};
 use kerbside_geometry::{Vehicle, WHEELS, Wheel, angle};
-use kerbside_recordings::run_folder::{self, CommandRow, ReferenceRow, RunError, Table};
-use kerbside_settings::{Uncertainty, parse_vehicle};
+use kerbside_recordings::run_folder::{self, CommandRow, ReferenceRow, Table};
+use kerbside_settings::{Uncertainty, load_vehicle};
 use kerbside_simulation::Command;
 
-use crate::configuration::{self, Refused};
+use crate::configuration::{self, refused_run as refused};
 use crate::exit::{Exit, Failure};
 
 /// A case, read.
@@ -39,9 +39,7 @@ impl Input {
         }
         let path = folder.join("vehicle.toml");
         let origin = path.display().to_string();
-        let text = std::fs::read_to_string(&path)
-            .map_err(|error| Failure::new(Exit::Data, format!("{origin}: {error}")))?;
-        let parsed = parse_vehicle(&origin, &text)
+        let parsed = load_vehicle(&path)
             .map_err(|error| Failure { exit: Exit::Data, ..Failure::from(error) })?;
         configuration::warn(&parsed.warnings);
         let (vehicle, allowance) = (parsed.value.vehicle, allowance(&parsed.value.uncertainty));
@@ -256,14 +254,4 @@ fn reference(table: Option<&Table<ReferenceRow>>) -> Series<3> {
     }
     let (t, value) = rows.into_iter().unzip();
     Series { t, value }
-}
-
-fn refused(error: RunError) -> Failure {
-    match error {
-        RunError::About(error) if !error.problems().is_empty() => {
-            let report = miette::Report::new(Refused::new(error.problems()));
-            Failure { exit: Exit::Data, report }
-        }
-        error => Failure::new(Exit::Data, error),
-    }
 }

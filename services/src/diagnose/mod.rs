@@ -7,6 +7,7 @@ mod files;
 mod input;
 #[cfg(test)]
 mod made_up;
+mod menu;
 mod report;
 mod summary;
 mod table;
@@ -18,7 +19,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use kerbside_diagnosis::{Case, Diagnosis};
+use kerbside_diagnosis::{Case, Diagnosis, Settings};
+use kerbside_settings::load_overlay;
 use serde_json::Value;
 
 pub use batch::Shard;
@@ -46,15 +48,18 @@ pub struct DiagnoseArgs {
     /// a table. A new one in the state folder where not given.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Overlay: show how far the gap shrinks with these effects in place of those that are found.
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     pub json: bool,
 }
 
 impl DiagnoseArgs {
-    /// The overlay that was given by hand.
-    fn model(&self) -> Option<&str> {
-        None
+    /// The overlay that was given by hand, as it was named.
+    fn model(&self) -> Option<String> {
+        self.model.as_ref().map(|path| path.display().to_string())
     }
 
     /// The command line that gives one case again.
@@ -85,6 +90,19 @@ impl Diagnosed {
         let facts = document::Facts { notices, model, seconds: self.seconds };
         document::of(&self.found, &facts)
     }
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`] where case or overlay are refused, by file and line.
+pub fn run(args: &DiagnoseArgs) -> Result<Exit, Failure> {
+    let model = args.model.as_deref().map(load_overlay).transpose()?;
+    run_with(args, &|case, progress| {
+        let settings = Settings { model: model.clone(), menu: menu::of(&case.vehicle) };
+        kerbside_diagnosis::diagnose(case, &settings, progress)
+            .map_err(|error| Failure::new(Exit::Data, format!("{}: {error}", case.name)))
+    })
 }
 
 /// Runs the verb with `diagnoser`.
@@ -118,7 +136,7 @@ fn single(args: &DiagnoseArgs, case: &Path, diagnoser: &Diagnoser<'_>) -> Result
 /// Reads and diagnoses the case in `folder`.
 fn diagnosed(
     folder: &Path,
-    model: Option<&str>,
+    model: Option<String>,
     diagnoser: &Diagnoser<'_>,
     progress: &dyn Fn(&str, f64),
 ) -> Result<Diagnosed, Failure> {
@@ -128,7 +146,7 @@ fn diagnosed(
     let found = diagnoser(&input.case, progress)?;
     document::check(&found).map_err(Failure::internal)?;
     let seconds = begin.elapsed().as_secs_f64();
-    Ok(Diagnosed { input, found, model: model.map(str::to_owned), seconds })
+    Ok(Diagnosed { input, found, model, seconds })
 }
 
 /// A bar on a terminal, nothing in a pipe.

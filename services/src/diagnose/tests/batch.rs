@@ -75,6 +75,9 @@ fn what_the_same_version_diagnosed_is_kept() {
     assert_eq!(batch(&cases, |_| {}), (2, Exit::Good));
     fs::remove_file(path("ambiguous")).unwrap();
     assert_eq!(batch(&cases, |_| {}), (1, Exit::Good));
+    // And neither is what was held against another overlay.
+    let model = Some(cases.path("model.toml"));
+    assert_eq!(batch(&cases, |args| args.model = model), (3, Exit::Good));
 }
 
 #[test]

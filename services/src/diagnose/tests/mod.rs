@@ -35,7 +35,15 @@ fn by_name(case: &Case, progress: &dyn Fn(&str, f64)) -> Result<Diagnosis, Failu
 
 fn arguments(cases: &Cases) -> DiagnoseArgs {
     let out = Some(cases.path("out"));
-    DiagnoseArgs { case: None, batch: None, shard: None, fresh: false, out, json: true }
+    DiagnoseArgs {
+        case: None,
+        batch: None,
+        shard: None,
+        fresh: false,
+        out,
+        model: None,
+        json: true,
+    }
 }
 
 fn read_json(path: &Path) -> Value {

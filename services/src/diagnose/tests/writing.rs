@@ -1,5 +1,7 @@
 //! From a diagnosis to files that others read.
 
+use kerbside_geometry::Wheel;
+use kerbside_settings::parse_overlay;
 use serde_json::Value;
 
 use super::super::document::{NEXT, OVERLAY, REPORT};
@@ -98,19 +100,15 @@ fn the_overlay_says_where_it_comes_from_and_is_what_was_found() {
     let text = document::overlay(&made_up::two_effects());
     assert!(text.starts_with("# Found by kerbside"), "{text}");
     assert!(text.contains("fraction = 0.082   # 0.078000 to 0.086000"), "{text}");
-    let read: toml_edit::DocumentMut = text.parse().unwrap();
-    let effects = read["effect"].as_array_of_tables().unwrap();
-    let effects: Vec<_> = effects.iter().collect();
-    assert_eq!(effects.len(), 2);
-    assert_eq!(effects[0]["id"].as_str(), Some("count_loss"));
-    assert_eq!(effects[0]["wheel"].as_str(), Some("rl"));
-    assert_eq!(effects[0]["fraction"].as_float(), Some(0.082));
-    assert_eq!(effects[1]["gain"].as_float(), Some(0.951));
+    let read = parse_overlay(OVERLAY, &text).unwrap();
+    let [loss, gain] = read.effects() else { panic!("two effects") };
+    assert_eq!((loss.definition().id, loss.wheel()), ("count_loss", Some(Wheel::RearLeft)));
+    assert_eq!(loss.value("fraction"), Some(0.082));
+    assert_eq!((gain.definition().id, gain.value("gain")), ("speed_gain", Some(0.951)));
     // Whatever a folder is called, it stays in the comment.
     let mut odd = made_up::two_effects();
     odd.case = "car\nid = \"x\"".to_owned();
-    let read: Result<toml_edit::DocumentMut, _> = document::overlay(&odd).parse();
-    assert!(read.unwrap().get("id").is_none());
+    assert_eq!(parse_overlay(OVERLAY, &document::overlay(&odd)).unwrap(), read);
 }
 
 /// Which of the files are there.

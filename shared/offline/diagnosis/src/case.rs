@@ -66,7 +66,6 @@ impl Wheels {
         }
     }
 
-    #[allow(dead_code)]
     pub(crate) fn series_mut(&mut self) -> &mut Series<4> {
         match self {
             Self::Rotation(series) | Self::Speed(series) => series,

@@ -1,9 +1,33 @@
 //! Where the gap between a simulator and a vehicle lies, which effect causes it, and how far it shrinks.
 
+mod analyse;
+mod answer;
+mod bench;
+mod bins;
+mod candidate;
 mod case;
+mod decide;
+mod diagnose;
+mod fit;
+mod folds;
+mod gauge;
+mod generic;
+mod linear;
+mod links;
+mod mistakes;
+mod noise;
+mod nuisance;
+mod path;
+mod pictures;
+mod prepare;
+mod rivals;
+mod search;
+mod shrink;
 mod verdict;
+mod words;
 
 pub use case::{Allowance, Case, Run, Series, Wheels};
+pub use diagnose::{DiagnosisError, Manoeuvre, Settings, diagnose};
 pub use verdict::{
     Alternative, Diagnosis, FoundEffect, FoundParameter, Interval, LinkGap, MapPoint, Mistake,
     Next, RegimePlot, Rival, RunPaths, Shrinkage, Verdict,

@@ -1,0 +1,245 @@
+//! The answer's effects, its alternatives, and what to drive next.
+
+use kerbside_simulation::Effects;
+use kerbside_simulation::effects::ParameterDefinition;
+use nalgebra::DMatrix;
+
+use crate::bench::Bench;
+use crate::candidate::Coordinate;
+use crate::case::{Case, Run, Series, Wheels};
+use crate::decide::SET;
+use crate::diagnose::{Found, Settings};
+use crate::fit::{Fit, Search};
+use crate::prepare::Ready;
+use crate::verdict::{Alternative, FoundEffect, FoundParameter, Interval, Next};
+
+const WHEELS: [&str; 4] = ["fl", "fr", "rl", "rr"];
+/// Half a 90 % interval in standard deviations.
+const HALF: f64 = 1.645;
+/// What intervals are widened by, as evidences are tempered.
+const WIDER: f64 = 1.225;
+
+/// The effects of the likeliest set.
+pub(crate) fn effects(found: &Found<'_>, search: &Search<'_>) -> Vec<FoundEffect> {
+    let Some(best) = found.decision.sets.first() else { return Vec::new() };
+    let fit = &found.analysis.fits[best.fit];
+    let covariance = covariance(fit);
+    let mut effects = Vec::new();
+    let mut row = 0;
+    for (candidate, at) in fit.set.iter().zip(&fit.at) {
+        let own = &search.candidates[*candidate];
+        let spread: Vec<f64> = (0..at.len())
+            .map(|c| {
+                WIDER * HALF * covariance[(row + c, row + c)].sqrt() * own.coordinates[c].deviation
+            })
+            .collect();
+        row += at.len();
+        let of =
+            |name: &str| own.definition.parameters.iter().find(|parameter| parameter.name == name);
+        let parameters = own
+            .intervals(at, &spread)
+            .into_iter()
+            .map(|(name, value)| FoundParameter { name, unit: of(name).map_or("", unit), value })
+            .collect();
+        let probability = found
+            .decision
+            .sets
+            .iter()
+            .filter(|set| {
+                found.analysis.fits[set.fit]
+                    .set
+                    .iter()
+                    .any(|c| search.candidates[*c].definition.id == own.definition.id)
+            })
+            .map(|set| set.probability)
+            .sum::<f64>()
+            .min(1.0);
+        effects.push(FoundEffect {
+            id: own.definition.id,
+            link: own.definition.link,
+            wheel: own.wheel.map(|wheel| WHEELS[wheel]),
+            parameters,
+            probability,
+        });
+    }
+    effects
+}
+
+fn unit(parameter: &'static ParameterDefinition) -> &'static str {
+    if parameter.unit == "1" { "" } else { parameter.unit }
+}
+
+fn covariance(fit: &Fit) -> DMatrix<f64> {
+    let n = fit.normal.ncols();
+    fit.normal.clone().cholesky().map_or_else(|| DMatrix::identity(n, n), |root| root.inverse())
+}
+
+/// The 90 % set: the fewest sets of effects, likeliest first, that hold nine tenths of what listed effects hold.
+pub(crate) fn alternatives(found: &Found<'_>) -> Vec<Alternative> {
+    let listed: f64 = found.decision.sets.iter().map(|set| set.probability).sum();
+    if found.decision.answer == 0 || listed <= 0.0 {
+        return Vec::new();
+    }
+    let mut reached = 0.0;
+    let mut alternatives: Vec<Alternative> = Vec::new();
+    for set in &found.decision.sets {
+        if reached >= SET * listed {
+            break;
+        }
+        reached += set.probability;
+        let fit = &found.analysis.fits[set.fit];
+        let ids: Vec<&'static str> =
+            fit.set.iter().map(|c| found.analysis.candidates[*c].definition.id).collect();
+        // The same effect at another wheel is no other alternative.
+        match alternatives.iter_mut().find(|alternative| alternative.ids == ids) {
+            Some(same) => same.probability += set.probability,
+            None => alternatives.push(Alternative { ids, probability: set.probability }),
+        }
+    }
+    alternatives
+}
+
+/// The manoeuvre that separates the two likeliest sets best for its duration; none where they are separated, or where no
+/// manoeuvre would.
+pub(crate) fn next(
+    case: &Case,
+    found: &Found<'_>,
+    search: &Search<'_>,
+    settings: &Settings,
+) -> Option<Next> {
+    let decision = found.decision;
+    let uncertain = decision.answer > 1
+        || (decision.answer == 1 && decision.sets.len() > 1 && decision.sets[0].probability < 0.95);
+    let [first, second] = [decision.sets.first()?, decision.sets.get(1)?];
+    if !uncertain {
+        return None;
+    }
+    let (one, other) = (&found.analysis.fits[first.fit], &found.analysis.fits[second.fit]);
+    let mut best: Option<(f64, f64, usize)> = None;
+    for (i, manoeuvre) in settings.menu.iter().enumerate() {
+        let Some(first) = manoeuvre.commands.first() else { continue };
+        let duration = manoeuvre.commands.last().map_or(0.0, |last| last.t - first.t).max(1.0);
+        let run = imagined(case, &manoeuvre.name, &manoeuvre.commands, duration);
+        let imagined = Case { runs: vec![run], ..case.clone() };
+        let Some(sigma) = separation(&imagined, found, search, one, other) else { continue };
+        if best.as_ref().is_none_or(|(rate, ..)| sigma / duration.sqrt() > *rate) {
+            best = Some((sigma / duration.sqrt(), sigma, i));
+        }
+    }
+    let (_, sigma, i) = best?;
+    let manoeuvre = &settings.menu[i];
+    let ids =
+        |fit: &Fit| fit.set.iter().map(|c| search.candidates[*c].definition.id).collect::<Vec<_>>();
+    Some(Next {
+        manoeuvre: manoeuvre.name.clone(),
+        separates: vec![ids(one), ids(other)],
+        sigma,
+        commands: manoeuvre.commands.iter().map(|c| (c.t, c.speed, c.steering)).collect(),
+    })
+}
+
+/// By how many standard deviations of the noise one set, driven, differs from the other fitted to it.
+fn separation(
+    case: &Case,
+    found: &Found<'_>,
+    search: &Search<'_>,
+    one: &Fit,
+    other: &Fit,
+) -> Option<f64> {
+    let mut ready = Ready::new(case);
+    ready.runs.first_mut()?.start = Default::default();
+    ready.imagine(&one.effects);
+    let bench = Bench::new(&ready, found.nuisances, &Effects::NEUTRAL, &found.analysis.noise);
+    let own = Search { bench: &bench, candidates: search.candidates };
+    let projection = own.projection(&other.set, &bench.all())?;
+    let fit = own.fit(&other.set, &other.at, &projection, 5);
+    // What the priors of the coordinates cost says nothing of the manoeuvre.
+    let prior = own.offsets(&fit).norm_squared();
+    Some((fit.cost - prior).max(0.0).sqrt())
+}
+
+/// A run that was not driven, with the sensors that the case has, at their mean rates.
+fn imagined(
+    case: &Case,
+    name: &str,
+    commands: &[kerbside_simulation::Command],
+    duration: f64,
+) -> Run {
+    let model = &case.runs[0];
+    let grid = |series: Option<(f64, f64)>, rows: usize| -> Vec<f64> {
+        let Some((begin, end)) = series else { return Vec::new() };
+        let period = (end - begin).max(1e-3) / crate::bins::to_f64(rows.max(2) - 1);
+        let mut stamps = Vec::new();
+        let mut t = 0.0;
+        while t < duration {
+            stamps.push(t);
+            t += period;
+        }
+        stamps
+    };
+    fn filled<const N: usize>(t: Vec<f64>, model: &Series<N>) -> Series<N> {
+        let row: [f64; N] =
+            core::array::from_fn(|column| if model.has(column) { 0.0 } else { f64::NAN });
+        let value = vec![row; t.len()];
+        Series { t, value }
+    }
+    let wheels = model.wheels.series();
+    let wheels = filled(grid(wheels.span(), wheels.t.len()), wheels);
+    Run {
+        name: name.to_owned(),
+        repeat_of: None,
+        start: None,
+        commands: commands.to_vec(),
+        wheels: if matches!(model.wheels, Wheels::Speed(_)) {
+            Wheels::Speed(wheels)
+        } else {
+            Wheels::Rotation(wheels)
+        },
+        steering: filled(grid(model.steering.span(), model.steering.t.len()), &model.steering),
+        gyro: filled(grid(model.gyro.span(), model.gyro.t.len()), &model.gyro),
+        reference: filled(grid(model.reference.span(), model.reference.t.len()), &model.reference),
+    }
+}
+
+impl crate::candidate::Candidate {
+    /// Parameters with intervals, from coordinates and half intervals of these.
+    fn intervals(&self, at: &[f64], half: &[f64]) -> Vec<(&'static str, Interval)> {
+        let values = self.parameters(at);
+        if self.definition.id == "floor_slope" {
+            // Length and direction of a vector: what lies across its length turns it.
+            let rate = values[1].1.max(1e-9);
+            let width = half[0].max(half[1]);
+            let turn = (width / rate).min(core::f64::consts::PI);
+            let halves = [turn, width];
+            return values
+                .into_iter()
+                .zip(halves)
+                .map(|((name, value), half)| {
+                    (name, Interval { value, low: value - half, high: value + half })
+                })
+                .collect();
+        }
+        let ends = |sign: f64| {
+            let within = |((at, half), c): ((&f64, &f64), &Coordinate)| {
+                (at + sign * half).clamp(c.low, c.high)
+            };
+            let moved: Vec<f64> = at.iter().zip(half).zip(&self.coordinates).map(within).collect();
+            self.parameters(&moved)
+        };
+        let (low, high) = (ends(-1.0), ends(1.0));
+        values
+            .into_iter()
+            .zip(low.into_iter().zip(high))
+            .map(|((name, value), ((_, low), (_, high)))| {
+                (
+                    name,
+                    Interval {
+                        value,
+                        low: low.min(high).min(value),
+                        high: high.max(low).max(value),
+                    },
+                )
+            })
+            .collect()
+    }
+}

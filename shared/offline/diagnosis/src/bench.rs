@@ -1,0 +1,197 @@
+//! What every hypothesis is judged on: whitened residuals, with the nuisances integrated out.
+
+use kerbside_simulation::Effects;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::bins::{CHANNELS, Channels, GYRO};
+use crate::generic::Extent;
+use crate::linear::{Design, Projection};
+use crate::noise::{Coefficients, Evidence, Noise, Whitener};
+use crate::nuisance::Nuisance;
+use crate::path::{Path, residuals};
+use crate::prepare::Ready;
+
+/// Whitened values of every run.
+pub(crate) type Whole = Vec<DVector<f64>>;
+
+/// The whitened data of a case about the paths of one set of effects.
+pub(crate) struct Bench<'a> {
+    pub ready: &'a Ready<'a>,
+    pub nuisances: &'a [Nuisance],
+    pub paths: Vec<Path>,
+    pub coefficients: Vec<Coefficients>,
+    pub whiteners: Vec<Whitener>,
+    pub designs: Vec<Design>,
+    pub normals: Vec<DMatrix<f64>>,
+    pub extent: Extent,
+    /// Residuals of `about`, not whitened.
+    pub raw: Vec<Vec<Channels>>,
+    raw_columns: Vec<Vec<Vec<Channels>>>,
+}
+
+impl<'a> Bench<'a> {
+    /// About the paths of `about`, with noise as in `noise`.
+    pub(crate) fn new(
+        ready: &'a Ready<'a>,
+        nuisances: &'a [Nuisance],
+        about: &Effects,
+        noise: &Noise,
+    ) -> Self {
+        let runs: Vec<usize> = (0..ready.runs.len()).collect();
+        let paths: Vec<Path> = runs.par_iter().map(|run| ready.path(*run, about)).collect();
+        let coefficients: Vec<Coefficients> = runs
+            .iter()
+            .map(|run| Coefficients::new(ready.vehicle, &ready.runs[*run].binned, &paths[*run]))
+            .collect();
+        let base: Vec<Vec<Channels>> =
+            runs.par_iter().map(|run| ready.predicted(*run, about)).collect();
+        let raw = runs
+            .iter()
+            .map(|run| {
+                let binned = &ready.runs[*run].binned;
+                residuals(binned, &paths[*run], &binned.measured, &base[*run])
+            })
+            .collect();
+        let raw_columns: Vec<Vec<Vec<Channels>>> = runs
+            .par_iter()
+            .map(|run| {
+                let column = |nuisance: &Nuisance| {
+                    column(ready, *run, &paths[*run], about, &base[*run], nuisance)
+                };
+                let mut columns: Vec<Vec<Channels>> = nuisances.iter().map(column).collect();
+                columns.push(late(&base[*run], GYRO, ready.runs[*run].binned.width));
+                columns
+            })
+            .collect();
+        let each: Vec<&Path> = paths.iter().collect();
+        let width = ready.runs.first().map_or(crate::bins::WIDTH, |run| run.binned.width);
+        let extent = Extent::new(&each, width, ready.vehicle.wheelbase, ready.vehicle.radius);
+        let mut bench = Self {
+            ready,
+            nuisances,
+            paths,
+            coefficients,
+            whiteners: Vec::new(),
+            designs: Vec::new(),
+            normals: Vec::new(),
+            extent,
+            raw,
+            raw_columns,
+        };
+        bench.whiten(noise);
+        bench
+    }
+
+    /// Replaces the noise.
+    pub(crate) fn whiten(&mut self, noise: &Noise) {
+        let evidence = self.evidence(&[]);
+        self.whiteners = evidence.par_iter().map(|run| run.whitener(noise)).collect();
+        self.designs = self
+            .whiteners
+            .par_iter()
+            .zip(&self.raw_columns)
+            .map(|(whitener, columns)| {
+                let mut values = Vec::with_capacity(whitener.values * columns.len());
+                for column in columns {
+                    whitener.apply(column, &mut values);
+                }
+                DMatrix::from_vec(whitener.values, columns.len(), values)
+            })
+            .collect();
+        self.normals = self.designs.iter().map(|design| design.tr_mul(design)).collect();
+    }
+
+    /// What the noise is estimated from: the residuals about which this bench is made, and the nuisances with `more`
+    /// columns (`[column][run]`).
+    pub(crate) fn evidence(&self, more: &[Vec<Vec<Channels>>]) -> Vec<Evidence> {
+        (0..self.raw.len())
+            .map(|run| {
+                let mut columns = self.raw_columns[run].clone();
+                columns.extend(more.iter().map(|column| column[run].clone()));
+                Evidence {
+                    coefficients: self.coefficients[run].clone(),
+                    residuals: self.raw[run].clone(),
+                    columns,
+                    follows: !self.ready.runs[run].run.has_commands(),
+                }
+            })
+            .collect()
+    }
+
+    /// Residuals of a set of effects about this bench's paths, not whitened.
+    pub(crate) fn raw_of(&self, run: usize, effects: &Effects) -> Vec<Channels> {
+        let binned = &self.ready.runs[run].binned;
+        residuals(binned, &self.paths[run], &binned.measured, &self.ready.predicted(run, effects))
+    }
+
+    /// Whitened residuals of a set of effects, by run.
+    pub(crate) fn whole(&self, effects: &Effects) -> Whole {
+        (0..self.raw.len()).map(|run| self.whitened(run, &self.raw_of(run, effects))).collect()
+    }
+
+    /// Whitens channels of a run.
+    pub(crate) fn whitened(&self, run: usize, channels: &[Channels]) -> DVector<f64> {
+        let mut values = Vec::with_capacity(self.whiteners[run].values);
+        self.whiteners[run].apply(channels, &mut values);
+        DVector::from_vec(values)
+    }
+
+    /// Every run.
+    pub(crate) fn all(&self) -> Vec<usize> {
+        (0..self.raw.len()).collect()
+    }
+
+    /// With the nuisances integrated out over `runs`, but for those that `drop` says.
+    pub(crate) fn projection(
+        &self,
+        runs: &[usize],
+        drop: impl Fn(&Nuisance) -> bool,
+    ) -> Option<Projection> {
+        let dropped: Vec<usize> = self
+            .nuisances
+            .iter()
+            .enumerate()
+            .filter(|(_, n)| drop(n))
+            .map(|(column, _)| column)
+            .collect();
+        Projection::new(&self.normals, runs, &dropped)
+    }
+
+    /// Sensitivities of a run to the nuisances, not whitened.
+    pub(crate) fn raw_columns(&self, run: usize) -> &[Vec<Channels>] {
+        &self.raw_columns[run]
+    }
+
+    /// Number of whitened values in all.
+    pub(crate) fn values(&self) -> usize {
+        self.whiteners.iter().map(|whitener| whitener.values).sum()
+    }
+}
+
+/// Delay of a gyro's reading that is no gap: a filter's or half a period of its own \[s\].
+const LATE: f64 = 0.004;
+
+/// What a channel does that is read a little late.
+fn late(base: &[Channels], channel: usize, width: f64) -> Vec<Channels> {
+    let mut column = vec![[0.0; CHANNELS]; base.len()];
+    for k in 1..base.len().saturating_sub(1) {
+        let slope = (base[k + 1][channel] - base[k - 1][channel]) / (2.0 * width);
+        column[k][channel] = if slope.is_finite() { -LATE * slope } else { 0.0 };
+    }
+    column
+}
+
+/// Sensitivity of a run's residuals to a nuisance of one standard deviation.
+fn column(
+    ready: &Ready<'_>,
+    run: usize,
+    path: &Path,
+    about: &Effects,
+    base: &[Channels],
+    nuisance: &Nuisance,
+) -> Vec<Channels> {
+    let mut effects = *about;
+    effects.set(nuisance.parameter, effects.get(nuisance.parameter) + nuisance.deviation);
+    residuals(&ready.runs[run].binned, path, &ready.predicted(run, &effects), base)
+}

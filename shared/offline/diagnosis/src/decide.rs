@@ -1,0 +1,173 @@
+//! The rule by which hypotheses become an answer; it is written here and nowhere else.
+//!
+//! Every hypothesis has a prior and an evidence: no effect; one listed effect; two; something that is not listed, alone
+//! or beside a listed one. Evidences are tempered, since the noise is a model, too. Probabilities are the normalised
+//! products.
+
+use kerbside_simulation::effects::Link;
+
+use crate::analyse::{Analysis, Beside};
+use crate::bins::to_f64;
+use crate::fit::Fit;
+use crate::verdict::Verdict;
+
+/// Prior probabilities of: no effect, one, two, something not listed.
+const NONE: f64 = 0.4;
+const SINGLE: f64 = 0.35;
+const PAIR: f64 = 0.1;
+const UNKNOWN: f64 = 0.15;
+/// Evidences count as if there were so many times fewer values: whitened values are never quite independent.
+const TEMPER: f64 = 1.5;
+/// A second effect has to make the runs this much likelier than the first alone, in logarithms.
+const SECOND: f64 = 6.0;
+/// What is not listed has to explain at least this share of what listed effects explain beside which it stands.
+const SHARE: f64 = 0.08;
+/// Probability that a set of alternatives reaches together.
+pub(crate) const SET: f64 = 0.9;
+/// Largest set that is an answer.
+const LARGEST: usize = 3;
+
+/// A set of listed effects with its probability.
+#[derive(Clone, Debug)]
+pub(crate) struct Weighed {
+    /// Index among the analysis's fits.
+    pub fit: usize,
+    pub probability: f64,
+}
+
+/// Probabilities of everything.
+#[derive(Clone, Debug)]
+pub(crate) struct Decision {
+    pub verdict: Verdict,
+    pub none: f64,
+    pub unknown: f64,
+    /// Sets of listed effects, likeliest first.
+    pub sets: Vec<Weighed>,
+    /// How many of them are the answer.
+    pub answer: usize,
+    /// The link and shape of what is not listed.
+    pub shape: Option<Beside>,
+    /// Links of what is not listed, by their share in it.
+    pub unknown_links: Vec<(Link, f64)>,
+}
+
+/// Decides.
+pub(crate) fn decide(found: &Analysis<'_>) -> Decision {
+    let zero = found.nothing.log_evidence();
+    let names = distinct(found);
+    let per_wheel = |fit: &Fit| {
+        let wheels = fit.set.iter().filter(|c| found.candidates[**c].wheel.is_some()).count();
+        wheels as f64 * 4.0_f64.ln()
+    };
+    let sets: Vec<(usize, f64)> = found
+        .fits
+        .iter()
+        .enumerate()
+        .filter(|(_, fit)| fit.set.len() == 1 || gains(found, fit))
+        .map(|(i, fit)| {
+            let prior = if fit.set.len() == 1 {
+                (SINGLE / names).ln()
+            } else {
+                (PAIR / (0.5 * names * (names - 1.0))).ln()
+            };
+            (i, prior - per_wheel(fit) + (fit.log_evidence() - zero) / TEMPER)
+        })
+        .collect();
+    let shapes = unlisted(found, zero);
+    let highest = sets
+        .iter()
+        .map(|(_, weight)| *weight)
+        .chain(shapes.iter().map(|(_, weight)| *weight))
+        .fold(NONE.ln(), f64::max);
+    let none = (NONE.ln() - highest).exp();
+    let mut weighed: Vec<Weighed> = sets
+        .iter()
+        .map(|(fit, weight)| Weighed { fit: *fit, probability: (weight - highest).exp() })
+        .collect();
+    let mut links: Vec<(Link, f64)> = Link::ALL.into_iter().map(|link| (link, 0.0)).collect();
+    for (beside, weight) in &shapes {
+        for (link, sum) in &mut links {
+            if *link == beside.entry.link() {
+                *sum += (weight - highest).exp();
+            }
+        }
+    }
+    let unknown: f64 = links.iter().map(|(_, sum)| sum).sum();
+    let total = none + unknown + weighed.iter().map(|w| w.probability).sum::<f64>();
+    for weighed in &mut weighed {
+        weighed.probability /= total;
+    }
+    weighed.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    links.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut decision = Decision {
+        verdict: Verdict::None,
+        none: none / total,
+        unknown: unknown / total,
+        sets: weighed,
+        answer: 0,
+        shape: shapes.first().map(|(beside, _)| *beside),
+        unknown_links: links
+            .into_iter()
+            .map(|(link, sum)| (link, sum / unknown.max(1e-300)))
+            .collect(),
+    };
+    answer(&mut decision);
+    decision
+}
+
+/// The answer that the probabilities give.
+fn answer(decision: &mut Decision) {
+    let listed: f64 = decision.sets.iter().map(|w| w.probability).sum();
+    if decision.none >= listed && decision.none >= decision.unknown {
+        decision.verdict = Verdict::None;
+        return;
+    }
+    if decision.unknown >= listed {
+        decision.verdict = Verdict::Unknown;
+        return;
+    }
+    let mut reached = 0.0;
+    for weighed in decision.sets.iter().take(LARGEST) {
+        if reached >= SET * listed {
+            break;
+        }
+        reached += weighed.probability;
+        decision.answer += 1;
+    }
+    decision.verdict = if decision.answer == 1 { Verdict::Effects } else { Verdict::Ambiguous };
+}
+
+/// How many effects the library has.
+fn distinct(found: &Analysis<'_>) -> f64 {
+    let mut names: Vec<&str> = found.candidates.iter().map(|c| c.definition.id).collect();
+    names.dedup();
+    to_f64(names.len())
+}
+
+/// Whether both of a pair are needed.
+fn gains(found: &Analysis<'_>, pair: &Fit) -> bool {
+    let alone =
+        |member: &usize| found.fits.iter().find(|fit| fit.set == [*member]).map(Fit::log_evidence);
+    let best = pair.set.iter().filter_map(alone).fold(f64::NEG_INFINITY, f64::max);
+    pair.log_evidence() > best + SECOND
+}
+
+/// What is not listed, alone and beside the likeliest listed effects, with its logarithmic weight, heaviest first.
+fn unlisted(found: &Analysis<'_>, zero: f64) -> Vec<(Beside, f64)> {
+    let count = to_f64(found.beside_nothing.len().max(1));
+    let prior = (UNKNOWN / count).ln();
+    let mut all: Vec<(Beside, f64)> = found
+        .beside_nothing
+        .iter()
+        .map(|beside| (*beside, prior + beside.log_evidence / TEMPER))
+        .collect();
+    if let Some(best) = found.fits.first() {
+        let listed = (found.nothing.cost - best.cost).max(0.0);
+        let base = best.log_evidence() - zero;
+        let prior = prior - distinct(found).ln();
+        let enough = found.beside_best.iter().filter(|beside| beside.gain > SHARE * listed);
+        all.extend(enough.map(|beside| (*beside, prior + (base + beside.log_evidence) / TEMPER)));
+    }
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all
+}

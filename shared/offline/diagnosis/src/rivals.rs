@@ -1,0 +1,85 @@
+//! What no listed effect is, as a rival: groups of shapes on top of a set of effects.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::bench::{Bench, Whole};
+use crate::bins::Channels;
+use crate::generic::{Axis, Entry, columns};
+use crate::linear::{Group, Projection, group};
+
+/// The shapes of one entry along one axis, whitened.
+#[derive(Clone, Debug)]
+pub(crate) struct Shapes {
+    pub entry: Entry,
+    pub axis: Axis,
+    /// `[shape]` of every run.
+    pub columns: Vec<Whole>,
+    /// The same, not whitened: `[shape][run]`.
+    pub raw: Vec<Vec<Vec<Channels>>>,
+}
+
+/// All groups that the bench's runs can show.
+pub(crate) fn shapes(bench: &Bench<'_>) -> Vec<Shapes> {
+    let pairs: Vec<(Entry, Axis)> = Entry::all()
+        .into_iter()
+        .flat_map(|entry| Axis::ALL.into_iter().map(move |axis| (entry, axis)))
+        .filter(|(entry, axis)| {
+            *axis != Axis::Turn || matches!(entry, Entry::Wheel(_) | Entry::Curvature | Entry::Slip)
+        })
+        .collect();
+    pairs.par_iter().map(|(entry, axis)| of(bench, *entry, *axis)).collect()
+}
+
+fn of(bench: &Bench<'_>, entry: Entry, axis: Axis) -> Shapes {
+    let mut raw: Vec<Vec<Vec<Channels>>> = Vec::new();
+    for run in bench.all() {
+        let along = (&bench.ready.runs[run].binned, &bench.paths[run], &bench.coefficients[run]);
+        for (shape, column) in columns(entry, axis, along, &bench.extent).into_iter().enumerate() {
+            if raw.len() <= shape {
+                raw.push(Vec::new());
+            }
+            raw[shape].push(column);
+        }
+    }
+    let columns = raw
+        .iter()
+        .map(|runs| {
+            runs.iter().enumerate().map(|(run, column)| bench.whitened(run, column)).collect()
+        })
+        .collect();
+    Shapes { entry, axis, columns, raw }
+}
+
+/// How much likelier a group makes what is left of a set of effects, whose sizes (`slopes`) may move along.
+pub(crate) fn judge(
+    bench: &Bench<'_>,
+    projection: &Projection,
+    residual: &Whole,
+    slopes: &[Whole],
+    shapes: &Shapes,
+) -> Option<Group> {
+    let mut vectors: Vec<&[DVector<f64>]> = slopes.iter().map(Vec::as_slice).collect();
+    vectors.extend(shapes.columns.iter().map(Vec::as_slice));
+    vectors.push(residual);
+    let products = projection.products(&bench.designs, &vectors);
+    group(&condition(products, slopes.len()))
+}
+
+/// Integrates the first `count` vectors out of a matrix of products, each with a unit prior.
+fn condition(products: DMatrix<f64>, count: usize) -> DMatrix<f64> {
+    let n = products.ncols() - count;
+    if count == 0 {
+        return products;
+    }
+    let mut own = products.view((0, 0), (count, count)).into_owned();
+    for i in 0..count {
+        own[(i, i)] += 1.0;
+    }
+    let across = products.view((0, count), (count, n)).into_owned();
+    let rest = products.view((count, count), (n, n)).into_owned();
+    match own.cholesky() {
+        Some(root) => rest - across.tr_mul(&root.solve(&across)),
+        None => rest,
+    }
+}
