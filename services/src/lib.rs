@@ -10,6 +10,7 @@ pub mod children;
 pub mod commands;
 pub mod compare;
 pub mod configuration;
+pub mod diagnose;
 pub mod estimator;
 pub mod exit;
 pub mod figures;

@@ -14,6 +14,7 @@ use kerbside_runtime::Instance;
 
 use crate::calibrate::CalibrateArgs;
 use crate::compare::CompareVerb;
+use crate::diagnose::DiagnoseArgs;
 use crate::exit::{Exit, Failure};
 use crate::park::ParkArgs;
 use crate::replay::ReplayArgs;
@@ -81,6 +82,9 @@ enum Verb {
         after_help = "Example: kerbside simulate CASE --runs CASE/holdout --model overlay.toml --out /tmp/after"
     )]
     Simulate(SimulateArgs),
+    /// Say where simulator and vehicle part, which effect causes it, and how far the gap shrinks.
+    #[command(after_help = "Example: kerbside diagnose CASE --out /tmp/diagnosis")]
+    Diagnose(DiagnoseArgs),
     /// Repeat the paper's experiments on the proving ground, and hold them against what they are to show.
     #[command(after_help = "Example: kerbside reproduce --trials 400 --out /tmp/paper")]
     Reproduce(ReproduceArgs),
@@ -157,6 +161,10 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
         Verb::Simulate(args) => {
             logging::start("simulate", level.unwrap_or("warn"), false);
             crate::simulate::run(args)
+        }
+        Verb::Diagnose(args) => {
+            logging::start("diagnose", level.unwrap_or("warn"), false);
+            crate::diagnose::run(args)
         }
         Verb::Reproduce(args) => {
             logging::start("reproduce", level.unwrap_or("warn"), false);
