@@ -92,6 +92,8 @@ fn what_cannot_be_asked_is_refused() {
     ] {
         assert_eq!(kerbside(&arguments, state.path()).status.code(), Some(2), "{arguments:?}");
     }
+    let nothing_to_write = kerbside(&["compare", "filters", "--out", "somewhere"], state.path());
+    assert_eq!(nothing_to_write.status.code(), Some(2));
     let missing = kerbside(&["compare", "filters", "/nowhere"], state.path());
     assert_eq!(missing.status.code(), Some(65));
 }

@@ -8,7 +8,7 @@ use kerbside_geometry::Vehicle;
 use kerbside_messages::{EstimatorState, Fix, Header, Odometry, ResetReason, Restore, Travel};
 use kerbside_odometry::{
     Estimator, EstimatorInputs, EstimatorSettings, Filter, Ingest, IngestSettings, Parameter,
-    ParameterPrior, Sensors,
+    ParameterEstimate, ParameterPrior, Sensors,
 };
 use support::{Car, car, placed, s_path, sensors};
 
@@ -197,6 +197,7 @@ fn what_was_learnt_from_fixes_is_not_lost() {
     let zero = Parameter::SteeringZero.index();
     let learnt = first.parameters().unwrap();
     assert!(learnt.covariance[(zero, zero)] < 0.1 * prior.covariance[(zero, zero)]);
+    assert_eq!(ParameterEstimate::of(&out.filter_state), Some(learnt));
     let restore = Restore { odometry: out, ..Restore::default() };
     let mut next = estimator(&vehicle, &sensors, &EstimatorSettings::default());
     let mut standing = *travels.last().unwrap();
