@@ -204,6 +204,10 @@ fn print_lesson(lesson: &Lesson) {
         "fixes over the first {percent:.0} % of the time: {} of {} taken",
         lesson.taken, lesson.given
     );
+    if lesson.taken < lesson.given {
+        println!("the others contradict the pose beyond what [calibration] or [uncertainty] of");
+        println!("vehicle.toml leaves open: calibrate first, or state more");
+    }
     let header = ["parameter", "vehicle.toml", "learnt", "95 %", "before"];
     let mut table = tables::figures(&header, &[1, 2, 3, 4]);
     for learnt in &lesson.learnt {
