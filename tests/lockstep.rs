@@ -11,7 +11,9 @@ use kerbside::lockstep::{LineFault, Script};
 use kerbside::manoeuvre::End;
 use kerbside::park::judge::{Verdict, judge};
 use kerbside::park::{Job, ParkArgs, Run, job, simulated};
-use kerbside_messages::{AlterReason, Cause, EstimatorState, Mode, Nanos, Process};
+use kerbside_messages::{
+    AlterReason, Cause, EstimatorState, Mode, Nanos, Odometry, Process, ResetReason,
+};
 
 #[derive(Parser)]
 struct Arguments {
@@ -139,6 +141,28 @@ fn after_a_death_the_operator_completes_the_manoeuvre() {
             "{process}: pose lost"
         );
     }
+}
+
+#[test]
+fn a_restarted_estimator_goes_on_with_what_it_had_learnt_of_the_vehicle() {
+    let script = Script { kills: vec![(under_way(), Process::Estimator)], ..Script::default() };
+    let (run, _) = drive(&["garage", "--rearm"], 1, script);
+    let restored = |odometry: &Odometry| odometry.reset_reason == ResetReason::Restored.code();
+    let lives: Vec<_> = run
+        .trace
+        .odometry
+        .chunk_by(|one, next| {
+            one.header.epoch == next.header.epoch && restored(one) == restored(next)
+        })
+        .collect();
+    let before = lives[0].last().unwrap();
+    let after = lives.iter().find(|life| restored(&life[0])).unwrap()[0];
+    let (known, taken) = (&before.filter_state, &after.filter_state);
+    assert_ne!(known.parameters, [0.0; 9], "it had learnt something");
+    assert_eq!(taken.parameters, known.parameters);
+    assert_eq!(taken.basis, known.basis);
+    assert!(after.covariance[0] > before.covariance[0], "what rolled by is less certain");
+    assert!(after.covariance[0] < 1.9 * before.covariance[0], "but not twice the covariance");
 }
 
 #[test]

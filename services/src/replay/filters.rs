@@ -33,6 +33,8 @@ pub struct Filtered {
     pub drifts: Vec<FilterDrift>,
     /// Why there is no drift.
     pub why: Option<String>,
+    /// What a person should know of the input, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Replays the drive at `source` with each of `filters`; `folder` takes its vehicle's file.
@@ -53,6 +55,7 @@ pub fn by_filters(
         distance: f64::NAN,
         drifts: Vec::new(),
         why: None,
+        notes: job.input.notices.clone(),
     };
     for filter in filters {
         job.service.stack.estimator.filter = *filter;
