@@ -54,7 +54,9 @@ impl Sensing {
         let encoders =
             vehicle.encoders.map_or([None; 4], |encoders| encoders.counts_per_revolution);
         Self {
-            radius: vehicle.radius,
+            radius: core::array::from_fn(|wheel| {
+                vehicle.speed_radius[wheel].unwrap_or(vehicle.radius[wheel])
+            }),
             counts_per_radian: encoders.map(|counts| counts.unwrap_or_default() / TAU),
             counts_mask: mask(encoders.map(|counts| counts.is_some())),
             speeds_mask: if vehicle.encoders.is_some() { 0 } else { wheels_mask(vehicle) },
