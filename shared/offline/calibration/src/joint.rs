@@ -8,7 +8,7 @@ use crate::condense::Condensed;
 use crate::error::CalibrationError;
 use crate::information::{Information, only_where_open, prior};
 use crate::noise::Settings;
-use crate::parameters::{Parameters, Vector};
+use crate::parameters::{COUNT, Parameters, Vector};
 use crate::solve::{Fit, Prior, first_start, fit};
 
 /// Why a run does not count.
@@ -110,7 +110,35 @@ fn robust(
         state = fit(runs, state.parameters, state.starts, prior, settings, settings.huber * scale)?;
     }
     let open = held(prior, &state, settings);
-    fit(runs, state.parameters, state.starts, &open, settings, settings.huber * scale)
+    let state = fit(runs, state.parameters, state.starts, &open, settings, settings.huber * scale)?;
+    without_strays(runs, state, &open, settings, settings.huber * scale)
+}
+
+/// Weak priors by which a parameter that the runs do not identify may be off its nominal value.
+const STRAY: f64 = 2.0;
+
+/// The fit again, with those parameters fixed at their nominal values that it does not identify and has yet drawn to where
+/// nobody believes them: there they make up for what the model leaves out, and spoil the others.
+fn without_strays(
+    runs: &[&Condensed],
+    state: Fit,
+    open: &Prior,
+    settings: &Settings,
+    limit: f64,
+) -> Result<Fit, CalibrationError> {
+    let told = Information::new(state.information() / typical(&state), open, settings);
+    let (mut fixed, mut parameters) = (*open, state.parameters);
+    for index in 0..COUNT {
+        let off = (parameters.values[index] - open.mean[index]).abs() / open.scale[index];
+        if open.free[index] && !told.identified[index] && off > STRAY {
+            fixed.free[index] = false;
+            parameters.values[index] = open.mean[index];
+        }
+    }
+    if fixed.free == open.free {
+        return Ok(state);
+    }
+    fit(runs, parameters, state.starts, &fixed, settings, limit)
 }
 
 /// The prior as the runs leave it open, in the unit of their residuals: where these are larger than believed the runs tell
@@ -202,7 +230,7 @@ fn finish(
 ) -> Result<JointFit, CalibrationError> {
     let mut information = Information::new(fit.information(), prior, settings);
     let told = Information::new(information.matrix / typical(&fit), prior, settings);
-    information.identified = told.identified;
+    information.identified = core::array::from_fn(|i| told.identified[i] && fit.free[i]);
     let open = held(prior, &fit, settings);
     let values = &fit.parameters.values;
     let differs = between(&fit.normals, values, &information.identified, &open);

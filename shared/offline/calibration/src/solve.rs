@@ -39,6 +39,8 @@ pub(crate) struct Fit {
     pub(crate) starts: Vec<Pose>,
     pub(crate) normals: Vec<Normal>,
     pub(crate) cost: f64,
+    /// Which parameters were fitted; the others are where the prior has them.
+    pub(crate) free: [bool; crate::parameters::COUNT],
 }
 
 impl Fit {
@@ -60,7 +62,8 @@ impl Fit {
         let away = parameters.values - prior.mean;
         let cost = normals.iter().map(|normal| normal.cost).sum::<f64>()
             + away.dot(&(prior.weight * away));
-        cost.is_finite().then_some(Self { parameters, starts, normals, cost })
+        let free = prior.free;
+        cost.is_finite().then_some(Self { parameters, starts, normals, cost, free })
     }
 
     /// Information of all runs on the parameters, without any prior.
