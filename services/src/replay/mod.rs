@@ -14,7 +14,7 @@ mod summary;
 mod track;
 mod uptake;
 
-pub use filters::{FilterDrift, Filtered, by_filters};
+pub use filters::{FilterDrift, Filtered, by_filters, drift_within};
 pub use input::{Described, Input, describe, find, only_source};
 pub use order::{Order, Place};
 pub use uptake::Uptaker;
