@@ -71,7 +71,7 @@ impl VehicleStage {
         // The vehicle's own layer of safety: commands that stay away are a command to stop.
         let silent = self.end.is_silent(time);
         if silent && !self.silent {
-            self.simulator.command(seconds(time), 0.0, self.simulator.steering());
+            self.simulator.halt(seconds(time));
         }
         self.silent = silent;
         while let Some(frame) = self.end.pending(time) {
