@@ -146,6 +146,8 @@ fn replay_of(path: &Path, vehicle: &Path) -> ReplayArgs {
         path: path.to_owned(),
         speed: None,
         pure: true,
+        fixes: None,
+        fix_rate: 2.0,
         vehicle: Some(vehicle.display().to_string()),
         config: None,
         instance: None,
