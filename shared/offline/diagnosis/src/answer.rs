@@ -17,7 +17,7 @@ const WHEELS: [&str; 4] = ["fl", "fr", "rl", "rr"];
 /// Half a 90 % interval in standard deviations.
 const HALF: f64 = 1.645;
 /// What intervals are widened by, as evidences are tempered.
-const WIDER: f64 = 1.225;
+const WIDER: f64 = 1.41;
 
 /// The effects of the likeliest set.
 pub(crate) fn effects(found: &Found<'_>, search: &Search<'_>) -> Vec<FoundEffect> {

@@ -4,6 +4,7 @@
 //! or beside a listed one. Evidences are tempered, since the noise is a model, too. Probabilities are the normalised
 //! products.
 
+use kerbside_geometry::math;
 use kerbside_simulation::effects::Link;
 
 use crate::analyse::{Analysis, Beside};
@@ -17,11 +18,13 @@ const SINGLE: f64 = 0.35;
 const PAIR: f64 = 0.1;
 const UNKNOWN: f64 = 0.15;
 /// Evidences count as if there were so many times fewer values: whitened values are never quite independent.
-const TEMPER: f64 = 1.5;
+const TEMPER: f64 = 2.0;
 /// A second effect has to make the runs this much likelier than the first alone, in logarithms.
-const SECOND: f64 = 6.0;
+const SECOND: f64 = 10.0;
 /// What is not listed has to explain at least this share of what listed effects explain beside which it stands.
-const SHARE: f64 = 0.08;
+const SHARE: f64 = 0.02;
+/// What is not listed has to make the runs this much likelier, in logarithms.
+const UNLISTED: f64 = 12.0;
 /// Probability that a set of alternatives reaches together.
 pub(crate) const SET: f64 = 0.9;
 /// Largest set that is an answer.
@@ -57,7 +60,7 @@ pub(crate) fn decide(found: &Analysis<'_>) -> Decision {
     let names = distinct(found);
     let per_wheel = |fit: &Fit| {
         let wheels = fit.set.iter().filter(|c| found.candidates[**c].wheel.is_some()).count();
-        wheels as f64 * 4.0_f64.ln()
+        to_f64(wheels) * math::ln(4.0)
     };
     let sets: Vec<(usize, f64)> = found
         .fits
@@ -66,9 +69,9 @@ pub(crate) fn decide(found: &Analysis<'_>) -> Decision {
         .filter(|(_, fit)| fit.set.len() == 1 || gains(found, fit))
         .map(|(i, fit)| {
             let prior = if fit.set.len() == 1 {
-                (SINGLE / names).ln()
+                math::ln(SINGLE / names)
             } else {
-                (PAIR / (0.5 * names * (names - 1.0))).ln()
+                math::ln(PAIR / (0.5 * names * (names - 1.0)))
             };
             (i, prior - per_wheel(fit) + (fit.log_evidence() - zero) / TEMPER)
         })
@@ -78,17 +81,17 @@ pub(crate) fn decide(found: &Analysis<'_>) -> Decision {
         .iter()
         .map(|(_, weight)| *weight)
         .chain(shapes.iter().map(|(_, weight)| *weight))
-        .fold(NONE.ln(), f64::max);
-    let none = (NONE.ln() - highest).exp();
+        .fold(math::ln(NONE), f64::max);
+    let none = math::exp(math::ln(NONE) - highest);
     let mut weighed: Vec<Weighed> = sets
         .iter()
-        .map(|(fit, weight)| Weighed { fit: *fit, probability: (weight - highest).exp() })
+        .map(|(fit, weight)| Weighed { fit: *fit, probability: math::exp(weight - highest) })
         .collect();
     let mut links: Vec<(Link, f64)> = Link::ALL.into_iter().map(|link| (link, 0.0)).collect();
     for (beside, weight) in &shapes {
         for (link, sum) in &mut links {
             if *link == beside.entry.link() {
-                *sum += (weight - highest).exp();
+                *sum += math::exp(weight - highest);
             }
         }
     }
@@ -155,17 +158,20 @@ fn gains(found: &Analysis<'_>, pair: &Fit) -> bool {
 /// What is not listed, alone and beside the likeliest listed effects, with its logarithmic weight, heaviest first.
 fn unlisted(found: &Analysis<'_>, zero: f64) -> Vec<(Beside, f64)> {
     let count = to_f64(found.beside_nothing.len().max(1));
-    let prior = (UNKNOWN / count).ln();
+    let prior = math::ln(UNKNOWN / count);
+    let worth = |beside: &&Beside| beside.log_evidence > UNLISTED;
     let mut all: Vec<(Beside, f64)> = found
         .beside_nothing
         .iter()
+        .filter(worth)
         .map(|beside| (*beside, prior + beside.log_evidence / TEMPER))
         .collect();
     if let Some(best) = found.fits.first() {
         let listed = (found.nothing.cost - best.cost).max(0.0);
         let base = best.log_evidence() - zero;
-        let prior = prior - distinct(found).ln();
-        let enough = found.beside_best.iter().filter(|beside| beside.gain > SHARE * listed);
+        let prior = prior - math::ln(distinct(found));
+        let enough =
+            found.beside_best.iter().filter(worth).filter(|beside| beside.gain > SHARE * listed);
         all.extend(enough.map(|beside| (*beside, prior + (base + beside.log_evidence) / TEMPER)));
     }
     all.sort_by(|a, b| b.1.total_cmp(&a.1));

@@ -1,5 +1,6 @@
 //! The most likely sizes of a set of effects, by Gauss and Newton on the whitened residuals.
 
+use kerbside_geometry::math;
 use kerbside_simulation::Effects;
 use nalgebra::{DMatrix, DVector};
 
@@ -33,7 +34,7 @@ impl Fit {
     /// coordinates. One that stands on its bound counts with what is left of it.
     pub(crate) fn log_evidence(&self) -> f64 {
         let Some(root) = self.normal.clone().cholesky() else { return f64::NEG_INFINITY };
-        let occam: f64 = root.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        let occam: f64 = root.l_dirty().diagonal().iter().map(|d| math::ln(*d)).sum();
         -0.5 * self.cost - occam
     }
 }

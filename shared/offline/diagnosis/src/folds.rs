@@ -1,5 +1,6 @@
 //! Each run left out in turn: what the others say of it, and how far its gap shrinks.
 
+use kerbside_geometry::math;
 use kerbside_simulation::Effects;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -47,7 +48,7 @@ impl Linearised {
         let square = products[(n, n)] + self.offset.norm_squared();
         let root = normal.cholesky()?;
         let step = root.solve(&right);
-        let occam: f64 = root.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+        let occam: f64 = root.l_dirty().diagonal().iter().map(|d| math::ln(*d)).sum();
         let log_evidence = -0.5 * (square - right.dot(&step)) - occam - projection.occam();
         Some(Over { log_evidence, step })
     }

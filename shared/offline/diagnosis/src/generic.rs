@@ -2,6 +2,7 @@
 //! small set of shapes, linear in their sizes, and competes with the listed effects as a rival: this is what `unknown`
 //! rests on.
 
+use kerbside_geometry::math;
 use kerbside_simulation::effects::Link;
 
 use crate::bins::{self, Binned, CHANNELS, Channels};
@@ -177,7 +178,7 @@ impl Extent {
             extent.duration = extent.duration.max(bins::to_f64(path.pose.len()) * width);
             for step in &path.steps {
                 extent.speed = extent.speed.max(step.distance.abs() / width);
-                extent.curvature = extent.curvature.max(step.steering.tan().abs() / wheelbase);
+                extent.curvature = extent.curvature.max(math::tan(step.steering).abs() / wheelbase);
             }
         }
         extent
@@ -199,7 +200,7 @@ pub(crate) fn shapes(
     let bins = path.pose.len();
     let step = |k: usize| path.steps[k.saturating_sub(1).min(path.steps.len() - 1)];
     let speed = |k: usize| step(k).distance / width;
-    let curvature = |k: usize| step(k).steering.tan() / extent.wheelbase;
+    let curvature = |k: usize| math::tan(step(k).steering) / extent.wheelbase;
     let over = |shape: &dyn Fn(usize) -> f64| (0..bins).map(shape).collect::<Vec<f64>>();
     let moving = |k: usize| speed(k).abs() / (speed(k).abs() + 0.02 * extent.speed);
     match axis {
@@ -227,7 +228,9 @@ pub(crate) fn shapes(
             };
             vec![over(&|k| (rate(k) / 0.02).clamp(-1.0, 1.0))]
         }
-        Axis::Heading => vec![over(&|k| path.pose[k].yaw.cos()), over(&|k| path.pose[k].yaw.sin())],
+        Axis::Heading => {
+            vec![over(&|k| math::cos(path.pose[k].yaw)), over(&|k| math::sin(path.pose[k].yaw))]
+        }
         Axis::Place => places(path, extent),
         Axis::Turn => {
             let wheel = if let Entry::Wheel(wheel) = entry { wheel } else { 2 };
@@ -243,7 +246,10 @@ pub(crate) fn shapes(
             // Faster than the bins can show it is nothing that they show.
             let shown =
                 |k: usize| (1.0 - (speed(k) * width / extent.radius[wheel] / 3.0).powi(2)).max(0.0);
-            vec![over(&|k| shown(k) * turns[k].cos()), over(&|k| shown(k) * turns[k].sin())]
+            vec![
+                over(&|k| shown(k) * math::cos(turns[k])),
+                over(&|k| shown(k) * math::sin(turns[k])),
+            ]
         }
     }
 }
@@ -261,7 +267,7 @@ fn places(path: &Path, extent: &Extent) -> Vec<Vec<f64>> {
             let bump = |k: usize| {
                 let pose = &path.pose[k];
                 let square = ((pose.x - x).powi(2) + (pose.y - y).powi(2)) / (0.6 * pitch).powi(2);
-                (-0.5 * square).exp()
+                math::exp(-0.5 * square)
             };
             let values: Vec<f64> = (0..path.pose.len()).map(bump).collect();
             shapes.push(values);
@@ -327,8 +333,8 @@ fn response(
         Entry::Position => {
             let put = |(value, pose): (&f64, &kerbside_geometry::Pose)| {
                 let mut row = [0.0; CHANNELS];
-                row[bins::REFERENCE] = value * (direction - pose.yaw).cos();
-                row[bins::REFERENCE + 1] = value * (direction - pose.yaw).sin();
+                row[bins::REFERENCE] = value * math::cos(direction - pose.yaw);
+                row[bins::REFERENCE + 1] = value * math::sin(direction - pose.yaw);
                 row
             };
             shape.iter().zip(&path.pose).map(put).collect()

@@ -1,5 +1,6 @@
 //! Least squares on whitened values, with everything that may differ besides integrated out.
 
+use kerbside_geometry::math;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Whitened design of one run: a column per thing that may differ, in units of its prior's standard deviation.
@@ -29,7 +30,7 @@ impl Projection {
 
     /// Half the logarithm of the normal matrix's determinant: what the columns cost an evidence.
     pub(crate) fn occam(&self) -> f64 {
-        self.root.l_dirty().diagonal().iter().map(|d| d.ln()).sum()
+        self.root.l_dirty().diagonal().iter().map(|d| math::ln(*d)).sum()
     }
 
     /// The runs that count.
@@ -82,6 +83,6 @@ pub(crate) fn group(products: &DMatrix<f64>) -> Option<Group> {
     let root = normal.cholesky()?;
     let sizes = root.solve(&right);
     let gain = right.dot(&sizes);
-    let occam: f64 = root.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
+    let occam: f64 = root.l_dirty().diagonal().iter().map(|d| math::ln(*d)).sum();
     Some(Group { log_evidence: 0.5 * gain - occam, gain })
 }

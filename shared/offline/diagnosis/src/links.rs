@@ -1,6 +1,7 @@
 //! Where the gap arises: each link is fed with what was measured before it, and what its output then still differs by
 //! over two seconds is held against the noise floor and against what a car in good order may have.
 
+use kerbside_geometry::math;
 use kerbside_simulation::effects::Link;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -167,10 +168,10 @@ fn local(bench: &Bench<'_>, run: usize, rows: &[Channels], from: usize, span: us
     let pose = |k: usize| &path.pose[k];
     let (a, b) = (&rows[from], &rows[from + span]);
     let turn = pose(from + span).yaw - pose(from).yaw;
-    let (sin, cos) = turn.sin_cos();
+    let (sin, cos) = math::sin_cos(turn);
     let (x, y) = (b[bins::REFERENCE], b[bins::REFERENCE + 1]);
     let (x, y) = (cos * x - sin * y, sin * x + cos * y);
-    let (s0, c0) = pose(from).yaw.sin_cos();
+    let (s0, c0) = math::sin_cos(pose(from).yaw);
     let (dx, dy) = (pose(from + span).x - pose(from).x, pose(from + span).y - pose(from).y);
     let (along, across) = (c0 * dx + s0 * dy, -s0 * dx + c0 * dy);
     // The mean yaw error over the window, where there is one: what bends the way is told by the turn.

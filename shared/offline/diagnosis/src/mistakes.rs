@@ -1,6 +1,7 @@
 //! Mistakes in one's own description or in a recorded signal: each is undone on trial, before any physics is asked.
 
 use core::f64::consts::{FRAC_PI_2, PI};
+use kerbside_geometry::math;
 
 use kerbside_simulation::Effects;
 use kerbside_simulation::effects::Link;
@@ -64,7 +65,8 @@ fn size_of(
     if values == 0 {
         return None;
     }
-    let sum: f64 = whole.iter().flat_map(|run| run.iter()).map(|z| (z * z / 9.0).ln_1p()).sum();
+    let sum: f64 =
+        whole.iter().flat_map(|run| run.iter()).map(|z| math::ln(1.0 + z * z / 9.0)).sum();
     #[allow(clippy::cast_precision_loss)]
     Some(sum / values as f64)
 }

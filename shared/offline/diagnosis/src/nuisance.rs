@@ -27,6 +27,8 @@ const CREEP: f64 = 0.025;
 const SIDE_CREEP: f64 = 0.06;
 /// Delay of a speed that is the mean over some tens of milliseconds \[s\].
 const MEAN_TIME: f64 = 0.008;
+/// What stamps of different sources are off by \[s\].
+const STAMP: f64 = 0.004;
 /// Share by which the radius behind a reported speed is off.
 const ROUNDED: f64 = 0.002;
 
@@ -60,8 +62,12 @@ fn inherent(case: &Case) -> Vec<Nuisance> {
     put("lateral_slip", "rate", SIDE_CREEP / GRAVITY);
     put("understeer", "gradient", 0.3 * SIDE_CREEP / (GRAVITY * vehicle.wheelbase));
     put("steering_compliance", "rate", 0.0003 / vehicle.limits.acceleration.max(1e-3));
-    if case.runs.iter().any(|run| matches!(run.wheels, Wheels::Speed(_))) {
-        put("encoder_delay", "delay", MEAN_TIME);
+    put("speed_delay", "delay", STAMP);
+    put("steering_delay", "delay", STAMP);
+    put("reference_delay", "delay", STAMP);
+    let means = case.runs.iter().any(|run| matches!(run.wheels, Wheels::Speed(_)));
+    put("encoder_delay", "delay", if means { MEAN_TIME } else { 0.5 * STAMP });
+    if means {
         put("count_loss", "fraction", ROUNDED);
     }
     all

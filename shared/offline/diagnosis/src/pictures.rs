@@ -1,5 +1,6 @@
 //! What the report draws.
 
+use kerbside_geometry::math;
 use kerbside_simulation::Effects;
 
 use crate::bins::{Channels, GYRO, REFERENCE, STEERING};
@@ -59,8 +60,13 @@ fn map(found: &Found<'_>, run: usize) -> Vec<MapPoint> {
         .filter_map(|(from, x)| {
             let y = across.iter().find(|(other, _)| other == from)?.1;
             let pose = path.pose.get(from + span / 2)?;
-            let turned = pose.yaw + y.atan2(*x);
-            Some(MapPoint { x: pose.x, y: pose.y, excess: x.hypot(y) / scale, direction: turned })
+            let turned = pose.yaw + math::atan2(y, *x);
+            Some(MapPoint {
+                x: pose.x,
+                y: pose.y,
+                excess: math::hypot(*x, y) / scale,
+                direction: turned,
+            })
         })
         .collect()
 }
@@ -95,14 +101,10 @@ pub(crate) fn plot(found: &Found<'_>, after: Option<&Effects>) -> Option<RegimeP
                 (rows[k][channel] - rows[k - 1][channel]) / binned.width
             }
         };
-        for k in 1..before.len() {
+        for (k, along) in axis[0].iter().enumerate().skip(1) {
             let at = value(&before, k);
             if at.is_finite() {
-                points.push((
-                    axis[0][k],
-                    at,
-                    with.as_ref().map_or(f64::NAN, |with| value(with, k)),
-                ));
+                points.push((*along, at, with.as_ref().map_or(f64::NAN, |with| value(with, k))));
             }
         }
     }

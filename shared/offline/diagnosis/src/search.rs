@@ -1,5 +1,6 @@
 //! Which sets of effects come into question: every single one, and pairs that grow from the best of them.
 
+use kerbside_geometry::math;
 use rayon::prelude::*;
 
 use crate::bench::Whole;
@@ -9,7 +10,9 @@ use crate::linear::Projection;
 /// Discs tried along the paths, for each radius.
 const PLACES: usize = 48;
 /// Begins of a floor's patch that are fitted in full.
-const PATCHES: usize = 6;
+const PATCHES: usize = 8;
+/// Valleys that are searched to their bottom.
+const VALLEYS: usize = 3;
 /// Rounds of a fit that only ranks.
 const BRIEF: usize = 3;
 /// Rounds of a fit that counts.
@@ -54,11 +57,14 @@ fn extended(
     let begins =
         if begins.len() > 8 { promising(search, &set, begins, &with, &projection) } else { begins };
     let rounds = if full { FULL } else { BRIEF };
-    let fits = begins.iter().map(|begin| search.fit(&set, &with(begin), &projection, BRIEF));
-    let mut best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let mut fits: Vec<Fit> =
+        begins.iter().map(|begin| search.fit(&set, &with(begin), &projection, BRIEF)).collect();
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     if full && search.candidates[candidate].definition.id == "floor_patch" {
-        best = moved_about(search, best, &projection);
+        fits.truncate(VALLEYS);
+        fits = fits.into_iter().map(|fit| moved_about(search, fit, &projection)).collect();
     }
+    let best = fits.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     Some(if rounds > BRIEF { search.fit(&set, &best.at, &projection, rounds) } else { best })
 }
 
@@ -155,7 +161,7 @@ fn places(search: &Search<'_>) -> Vec<(f64, f64)> {
     let pitch = 0.8 * search.bench.extent.wheelbase;
     let mut places: Vec<(f64, f64)> = Vec::new();
     for pose in search.bench.paths.iter().flat_map(|path| &path.pose) {
-        let far = |place: &(f64, f64)| (place.0 - pose.x).hypot(place.1 - pose.y) > pitch;
+        let far = |place: &(f64, f64)| math::hypot(place.0 - pose.x, place.1 - pose.y) > pitch;
         if places.iter().all(far) {
             places.push((pose.x, pose.y));
         }
@@ -196,9 +202,28 @@ pub(crate) fn hypotheses(search: &Search<'_>, keep: usize) -> Vec<Fit> {
             Some(search.fit(&pair.set, &pair.at, &projection, FULL))
         })
         .collect();
+    deepen(search, &mut singles, &pairs);
     singles.extend(pairs);
     rank(&mut singles);
     singles
+}
+
+/// Begins singles again where a pair has found a better place for one of its two.
+fn deepen(search: &Search<'_>, singles: &mut [Fit], pairs: &[Fit]) {
+    for single in singles {
+        let own = single.set[0];
+        for pair in pairs {
+            let at = pair.set.iter().zip(&pair.at).find(|(member, _)| **member == own);
+            let Some((_, at)) = at else { continue };
+            let Some(projection) = search.projection(&single.set, &search.bench.all()) else {
+                continue;
+            };
+            let again = search.fit(&single.set, core::slice::from_ref(at), &projection, BRIEF);
+            if again.cost < single.cost - 0.1 {
+                *single = search.fit(&single.set, &again.at, &projection, FULL);
+            }
+        }
+    }
 }
 
 /// Likeliest first.

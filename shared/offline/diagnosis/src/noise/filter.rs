@@ -6,6 +6,7 @@ use super::coefficients::{
 };
 use super::level::{Level, Noise};
 use crate::bins::{self, CHANNELS, Channels};
+use kerbside_geometry::math;
 
 type State = [f64; STATES];
 
@@ -62,7 +63,7 @@ impl Whitener {
             for channel in (0..CHANNELS).filter(|channel| present[*channel]) {
                 let row = measurement(channel, rate, coefficients.speeds);
                 let update = model.update(&mut covariance, channel, &row);
-                log_determinant -= 2.0 * update.weight.ln();
+                log_determinant -= 2.0 * math::ln(update.weight);
                 values += 1;
                 bin.push(update);
             }
@@ -195,7 +196,7 @@ impl Model {
         let mut decay = [1.0; STATES];
         let mut put = |state: usize, deviation: f64, time: f64| {
             start[state] = deviation * deviation;
-            decay[state] = (-width / time.max(1e-3)).exp();
+            decay[state] = math::exp(-width / time.max(1e-3));
         };
         if noise.follows {
             put(SPEED, FOLLOWS.0, FOLLOWS_TIME);

@@ -1,5 +1,6 @@
 //! The noise that makes what was measured most likely.
 
+use kerbside_geometry::math;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -172,7 +173,7 @@ fn objective(evidence: &[Evidence], prior: &Noise, noise: &Noise) -> f64 {
     if columns > 0 {
         let Some(root) = normal.cholesky() else { return f64::INFINITY };
         value -= right.dot(&root.solve(&right));
-        value += 2.0 * root.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        value += 2.0 * root.l_dirty().diagonal().iter().map(|d| math::ln(*d)).sum::<f64>();
     }
     for level in 0..COUNT {
         let off = (noise.log[level] - prior.log[level]) / Level::ALL[level].spread();

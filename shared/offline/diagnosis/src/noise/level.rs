@@ -1,6 +1,6 @@
 //! How strong each part of the noise is.
 
-use kerbside_geometry::Vehicle;
+use kerbside_geometry::{Vehicle, math};
 
 /// A part of the noise: standard deviation or time constant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,7 +147,7 @@ impl Noise {
                 Level::RunRack => 0.0003,
                 Level::RunGyro => 0.05 * gyro.max(1e-6),
             };
-            noise.log[level as usize] = value.ln();
+            noise.log[level as usize] = math::ln(value);
         }
         noise
     }
@@ -155,6 +155,6 @@ impl Noise {
     /// The level itself.
     #[must_use]
     pub(crate) fn get(&self, level: Level) -> f64 {
-        self.log[level as usize].exp()
+        math::exp(self.log[level as usize])
     }
 }
