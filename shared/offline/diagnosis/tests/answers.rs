@@ -1,0 +1,178 @@
+//! The answer follows from the data: effects put in are found with their sizes, nothing is found where nothing is,
+//! what is not listed is said to be unknown, and mistakes are told from physics.
+
+mod support;
+
+use kerbside_diagnosis::{Case, Diagnosis, DiagnosisError, Settings, Verdict, Wheels, diagnose};
+use kerbside_simulation::effects::Link;
+use kerbside_simulation::{Effects, Parameter};
+use support::{ALL, Sensors, case};
+
+fn answer(case: &Case) -> Diagnosis {
+    diagnose(case, &Settings::default(), &|_, _| {}).expect("a diagnosis")
+}
+
+fn with(id: &str, name: &str, value: f64) -> Effects {
+    Effects::NEUTRAL.with(Parameter::find(id, name).expect("listed"), value)
+}
+
+fn finds(id: &str, name: &str, value: f64, link: Link, tolerance: f64) {
+    let found = answer(&case(&with(id, name, value), ALL, 1));
+    assert_eq!(found.verdict, Verdict::Effects, "{}", found.sentence);
+    assert_eq!(found.effects.len(), 1, "{}", found.sentence);
+    let effect = &found.effects[0];
+    assert_eq!((effect.id, effect.link), (id, link), "{}", found.sentence);
+    let parameter =
+        effect.parameters.iter().find(|parameter| parameter.name == name).expect("named");
+    assert!((parameter.value.value - value).abs() < tolerance, "{}", found.sentence);
+    assert!(
+        parameter.value.low <= parameter.value.value
+            && parameter.value.value <= parameter.value.high
+    );
+    assert_eq!(found.links_named, [link]);
+}
+
+#[test]
+fn a_speed_gain_is_found() {
+    finds("speed_gain", "gain", 0.95, Link::SpeedActuation, 0.002);
+}
+
+#[test]
+fn a_steering_delay_is_found() {
+    finds("steering_delay", "delay", 0.08, Link::SteeringActuation, 0.004);
+}
+
+#[test]
+fn a_steering_offset_is_found() {
+    finds("steering_offset", "offset", 0.02, Link::Ground, 0.002);
+}
+
+#[test]
+fn a_gyro_bias_is_found() {
+    finds("gyro_bias", "bias", 0.008, Link::Sensing, 0.001);
+}
+
+#[test]
+fn a_reference_delay_is_found() {
+    finds("reference_delay", "delay", 0.1, Link::Reference, 0.005);
+}
+
+#[test]
+fn two_effects_are_found_together() {
+    let effects = with("steering_offset", "offset", 0.025)
+        .with(Parameter::find("speed_lag", "lag").expect("listed"), 0.2);
+    let found = answer(&case(&effects, ALL, 2));
+    let mut ids: Vec<&str> = found.effects.iter().map(|effect| effect.id).collect();
+    ids.sort_unstable();
+    assert_eq!(
+        (found.verdict, ids.as_slice()),
+        (Verdict::Effects, &["speed_lag", "steering_offset"][..]),
+        "{}",
+        found.sentence
+    );
+    assert_eq!(found.links_named, [Link::SpeedActuation, Link::Ground]);
+    let gap = found.gap.expect("a reference");
+    assert!(gap.removed.expect("a gap").value > 0.8, "{gap:?}");
+}
+
+#[test]
+fn a_car_in_good_order_has_nothing() {
+    let found = answer(&case(&with("speed_gain", "gain", 1.003), ALL, 3));
+    assert_eq!(found.verdict, Verdict::None, "{}", found.sentence);
+    assert!(
+        found.effects.is_empty() && found.alternatives.is_empty() && found.links_named.is_empty()
+    );
+    let above: Vec<_> = found.links.iter().filter(|link| link.low > 0.0).collect();
+    assert!(above.is_empty(), "{above:?}");
+}
+
+#[test]
+fn what_depends_on_the_direction_of_travel_is_unknown() {
+    let mut left = case(&with("steering_offset", "offset", 0.03), ALL, 4);
+    let right = case(&with("steering_offset", "offset", -0.03), ALL, 4);
+    // The drives that go in reverse for their second half are of the other car: none is listed that changes sides.
+    for drive in [2, 4, 5] {
+        left.runs[drive] = right.runs[drive].clone();
+    }
+    let found = answer(&left);
+    assert_ne!(found.verdict, Verdict::None, "{}", found.sentence);
+    assert!(
+        found.effects.iter().all(|effect| effect.id != "steering_offset"),
+        "{}",
+        found.sentence
+    );
+}
+
+#[test]
+fn without_sensors_the_steering_and_the_wheelbase_are_twins() {
+    let sensors = Sensors { steering: false, gyro: false, yaw: true };
+    let mut bare = case(&with("steering_gain", "gain", 1.08), sensors, 5);
+    for run in &mut bare.runs {
+        let Wheels::Rotation(series) = &mut run.wheels else { panic!("counts") };
+        series.value.iter_mut().for_each(|row| (row[0], row[1]) = (f64::NAN, f64::NAN));
+    }
+    let found = answer(&bare);
+    assert_eq!(found.verdict, Verdict::Ambiguous, "{}", found.sentence);
+    let ids: Vec<&str> = found.alternatives.iter().flat_map(|a| a.ids.clone()).collect();
+    assert!(ids.contains(&"steering_gain") && ids.contains(&"wheelbase_scale"), "{ids:?}");
+    assert!(found.not_excited.contains(&"gyro_bias"), "{:?}", found.not_excited);
+}
+
+#[test]
+fn a_gyro_with_the_wrong_sign_is_a_mistake() {
+    let mut wrong = case(&Effects::NEUTRAL, ALL, 6);
+    for run in &mut wrong.runs {
+        run.gyro.value.iter_mut().for_each(|row| row[0] = -row[0]);
+    }
+    let found = answer(&wrong);
+    assert_eq!(found.verdict, Verdict::Mistake, "{}", found.sentence);
+    assert_eq!(found.mistake.as_ref().map(|mistake| mistake.kind), Some("sign"));
+}
+
+#[test]
+fn degrees_and_exchanged_wheels_are_mistakes() {
+    let mut degrees = case(&Effects::NEUTRAL, ALL, 7);
+    for run in &mut degrees.runs {
+        run.steering.value.iter_mut().for_each(|row| row[0] = row[0].to_degrees());
+    }
+    assert_eq!(answer(&degrees).mistake.map(|mistake| mistake.kind), Some("degrees"));
+    let mut swapped = case(&Effects::NEUTRAL, ALL, 8);
+    for run in &mut swapped.runs {
+        let Wheels::Rotation(series) = &mut run.wheels else { panic!("counts") };
+        series.value.iter_mut().for_each(|row| row.swap(2, 3));
+    }
+    assert_eq!(answer(&swapped).mistake.map(|mistake| mistake.kind), Some("swap"));
+}
+
+#[test]
+fn what_is_missing_narrows_the_answer_and_breaks_nothing() {
+    let mut short = case(&with("steering_offset", "offset", 0.02), ALL, 9);
+    short.allowance = None;
+    for run in &mut short.runs {
+        run.commands.clear();
+    }
+    let found = answer(&short);
+    assert!(found.notices.iter().any(|notice| notice.contains("commands")), "{:?}", found.notices);
+    assert!(
+        found.effects.iter().all(|effect| effect.link != Link::SpeedActuation),
+        "{}",
+        found.sentence
+    );
+    for run in &mut short.runs {
+        run.reference = kerbside_diagnosis::Series::default();
+    }
+    answer(&short);
+}
+
+#[test]
+fn nothing_to_diagnose_is_said() {
+    let mut none = case(&Effects::NEUTRAL, ALL, 10);
+    none.runs.clear();
+    assert_eq!(diagnose(&none, &Settings::default(), &|_, _| {}), Err(DiagnosisError::NoRun));
+}
+
+#[test]
+fn the_same_case_gives_the_same_answer() {
+    let case = case(&with("understeer", "gradient", 0.8), ALL, 11);
+    assert_eq!(format!("{:?}", answer(&case)), format!("{:?}", answer(&case)));
+}

@@ -1,0 +1,146 @@
+//! Cases for the tests: the simulator's vehicle with effects put in, its sensors with seeded noise, and a floor that
+//! disturbs it a little. That the model fits its own data says nothing of other plants; it does say whether the answer
+//! follows from the data.
+
+use core::f64::consts::TAU;
+
+use kerbside_diagnosis::{Allowance, Case, Run, Series, Wheels};
+use kerbside_geometry::{Gyro, Pose, Reference, Vehicle, math};
+use kerbside_simulation::{Command, Drive, Effects, Trajectory};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// Which sensors a case has.
+#[derive(Clone, Copy)]
+pub struct Sensors {
+    pub steering: bool,
+    pub gyro: bool,
+    pub yaw: bool,
+}
+
+pub const ALL: Sensors = Sensors { steering: true, gyro: true, yaw: true };
+
+/// The paper's car with a gyro and a reference.
+pub fn vehicle() -> Vehicle {
+    Vehicle {
+        gyro: Some(Gyro { noise: 0.003, rate: 40.0 }),
+        reference: Some(Reference {
+            position_noise: 0.002,
+            yaw_noise: 0.002,
+            rate: 20.0,
+            marker: Pose::default(),
+        }),
+        ..Vehicle::paper_car()
+    }
+}
+
+/// What a car in good order may have.
+pub fn allowance() -> Allowance {
+    let mut allowance = Allowance::default();
+    for (field, deviation) in
+        [("wheelbase", 0.001), ("track_front", 0.001), ("track_rear", 0.001), ("radius", 0.0001)]
+    {
+        allowance.fields.insert(field.to_owned(), deviation);
+    }
+    for (id, name, deviation) in [
+        ("speed_gain", "gain", 0.003),
+        ("steering_gain", "gain", 0.004),
+        ("steering_offset", "offset", 0.001),
+        ("gyro_bias", "bias", 0.0003),
+    ] {
+        allowance.effects.insert((id.to_owned(), name.to_owned()), deviation);
+    }
+    allowance
+}
+
+/// Normal deviates.
+struct Dice(Pcg64Mcg);
+
+impl Dice {
+    fn normal(&mut self) -> f64 {
+        let (u, v): (f64, f64) = (self.0.random(), self.0.random());
+        (-2.0 * math::ln(1.0 - u)).sqrt() * math::cos(TAU * v)
+    }
+}
+
+/// Speed and steering of six drives at `t` \[s\].
+fn asked(drive: usize, t: f64) -> (f64, f64) {
+    if t < 1.0 {
+        return (0.0, 0.0);
+    }
+    let phase = t - 1.0;
+    match drive {
+        0 => (0.3, 0.35 * math::sin(TAU * phase / 5.0)),
+        1 => (if phase % 6.0 < 3.0 { 0.4 } else { 0.15 }, 0.3),
+        2 => (if phase < 5.0 { 0.35 } else { -0.3 }, -0.25),
+        3 => (0.25, if phase % 4.0 < 2.0 { 0.4 } else { -0.4 }),
+        4 => (if phase < 6.0 { 0.45 } else { -0.2 }, 0.0),
+        _ => (0.2, if phase % 5.0 < 2.5 { -0.2 } else { 0.1 }),
+    }
+}
+
+/// A case of six drives of 12 s; `shift` alters the effects within a drive, given its number, the time and whether the
+/// car is asked to go in reverse.
+pub fn case(effects: &Effects, sensors: Sensors, seed: u64) -> Case {
+    let mut vehicle = vehicle();
+    if !sensors.steering {
+        vehicle.steering_sensor = None;
+    }
+    if !sensors.gyro {
+        vehicle.gyro = None;
+    }
+    let runs = (0..6).map(|drive| run(&vehicle, effects, sensors, drive, seed)).collect();
+    Case { name: "case".to_owned(), vehicle, allowance: Some(allowance()), runs }
+}
+
+fn run(vehicle: &Vehicle, effects: &Effects, sensors: Sensors, drive: usize, seed: u64) -> Run {
+    let mut dice = Dice(Pcg64Mcg::seed_from_u64(seed * 100 + drive as u64));
+    let commands: Vec<Command> = (0..240)
+        .map(|k| {
+            let t = 0.05 * f64::from(k);
+            let (speed, steering) = asked(drive, t);
+            Command { t, speed, steering }
+        })
+        .collect();
+    let start = Pose::new(0.3 * dice.normal(), 0.3 * dice.normal(), 0.5 * dice.normal());
+    let mut trajectory = Trajectory::default();
+    Drive { vehicle, effects: *effects, commands: &commands, start, step: 0.005 }
+        .trajectory(12.1, &mut trajectory);
+    let stamps =
+        |rate: f64| (0..).map(move |k| f64::from(k) / rate + 0.003).take_while(|t| *t < 12.0);
+    let per_radian = 2048.0 / TAU;
+    let mut wheels = Series::default();
+    for t in stamps(50.0) {
+        wheels.t.push(t);
+        wheels.value.push(
+            trajectory.rotation(t).map(|turn| ((turn * per_radian).floor() + 0.5) / per_radian),
+        );
+    }
+    let mut steering = Series::default();
+    for t in stamps(25.0).take_while(|_| sensors.steering) {
+        steering.t.push(t);
+        steering.value.push([trajectory.steering(t) + 0.002 * dice.normal()]);
+    }
+    let mut gyro = Series::default();
+    for t in stamps(40.0).take_while(|_| sensors.gyro) {
+        gyro.t.push(t);
+        gyro.value.push([trajectory.yaw_rate(t) + 0.003 * dice.normal()]);
+    }
+    let mut reference = Series::default();
+    for t in stamps(20.0) {
+        let pose = trajectory.reference(t);
+        let yaw = if sensors.yaw { pose.yaw + 0.002 * dice.normal() } else { f64::NAN };
+        reference.t.push(t);
+        reference.value.push([pose.x + 0.002 * dice.normal(), pose.y + 0.002 * dice.normal(), yaw]);
+    }
+    Run {
+        name: format!("drive-{drive}"),
+        repeat_of: None,
+        start: None,
+        commands,
+        wheels: Wheels::Rotation(wheels),
+        steering,
+        gyro,
+        reference,
+    }
+}
