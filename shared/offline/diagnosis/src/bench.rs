@@ -163,6 +163,21 @@ impl<'a> Bench<'a> {
         &self.raw_columns[run]
     }
 
+    /// Whether the model predicts a number wherever one was measured: a description may be so wrong that it does not.
+    pub(crate) fn is_whole(&self) -> bool {
+        let present = |run: usize| &self.coefficients[run].present;
+        self.raw.iter().enumerate().all(|(run, rows)| {
+            rows.iter().zip(present(run)).all(|(row, present)| {
+                row.iter().zip(present).all(|(value, present)| !present || value.is_finite())
+            })
+        })
+    }
+
+    /// Whether every run lacks commands: motor and rack are what was measured of them.
+    pub(crate) fn only_follows(&self) -> bool {
+        self.ready.runs.iter().all(|run| !run.run.has_commands())
+    }
+
     /// Number of whitened values in all.
     pub(crate) fn values(&self) -> usize {
         self.whiteners.iter().map(|whitener| whitener.values).sum()

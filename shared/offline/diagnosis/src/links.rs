@@ -266,6 +266,9 @@ pub(crate) fn chain(bench: &Bench<'_>, noise: &Noise, residuals: &[Vec<Channels>
     let gaps: Vec<(Signal, LinkGap)> = Signal::ALL
         .into_iter()
         .enumerate()
+        .filter(|(_, signal)| {
+            !(bench.only_follows() && matches!(signal, Signal::DrivenTravel | Signal::Steering))
+        })
         .filter_map(|(i, signal)| {
             let own: Vec<&Windows> = measured.iter().map(|run| &run[i]).collect();
             let floor = pooled(floors.iter().map(|run| run[i]));

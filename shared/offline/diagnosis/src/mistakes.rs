@@ -23,6 +23,8 @@ struct Trial {
 
 /// What is left of the residuals' size where a mistake is undone, at most.
 const LEFT: f64 = 0.35;
+/// The same where what is left is still large: then it may be something else that a mistake happens to hide.
+const NEARLY: f64 = 0.1;
 /// Mean robust size of the residuals below which nothing looks like a mistake.
 const SMALL: f64 = 1.2;
 
@@ -45,7 +47,7 @@ pub(crate) fn find(
         }
     }
     let (after, trial) = best?;
-    (after < LEFT * before).then_some(Mistake {
+    (after < LEFT * before && (after < SMALL || after < NEARLY * before)).then_some(Mistake {
         kind: trial.kind,
         detail: trial.detail,
         link: trial.link,
@@ -62,7 +64,7 @@ fn size_of(
     let bench = Bench::new(&ready, nuisances, &Effects::NEUTRAL, &prior(&ready));
     let whole = bench.whole(&Effects::NEUTRAL);
     let values = bench.values();
-    if values == 0 {
+    if values == 0 || !bench.is_whole() {
         return None;
     }
     let sum: f64 =

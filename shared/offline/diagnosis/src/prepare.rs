@@ -233,6 +233,58 @@ fn follow(run: &Run, vehicle: &Vehicle) -> Followed {
         |reading: f64| vehicle.steering_sensor.map_or(reading, |sensor| sensor.angle(reading));
     let rows =
         run.steering.t.iter().zip(&run.steering.value).filter(|(_, value)| value[0].is_finite());
-    let racks = rows.map(|(t, value)| Sample { t: *t, value: angle(value[0]) }).collect();
+    let racks: Vec<Sample> =
+        rows.map(|(t, value)| Sample { t: *t, value: angle(value[0]) }).collect();
+    let racks = if racks.is_empty() { turning(run, vehicle) } else { racks };
     Followed { speeds, racks }
+}
+
+/// Time over which two wheels' ways are compared \[s\].
+const COMPARED: f64 = 0.2;
+/// Largest angle that two wheels' ways are taken for \[rad\].
+const LARGEST: f64 = 1.35;
+
+/// Without a steering sensor: the angle at which the two wheels of the rear axle would roll as far as they did; of the
+/// front one where the rear one was not read (at small angles the same). Straight where no axle was read on both sides.
+fn turning(run: &Run, vehicle: &Vehicle) -> Vec<Sample> {
+    let series = run.wheels.series();
+    let axles = [([2, 3], vehicle.track_rear), ([0, 1], vehicle.track_front)];
+    let read = |wheels: &[usize; 2]| wheels.iter().all(|wheel| series.has(*wheel));
+    let Some(([left, right], track)) =
+        axles.iter().find(|(wheels, track)| *track > 0.0 && read(wheels))
+    else {
+        return Vec::new();
+    };
+    let reports = matches!(run.wheels, Wheels::Speed(_));
+    let way = |row: &[f64; 4], wheel: usize| {
+        row[wheel] * if reports { 1.0 } else { vehicle.radius[wheel] }
+    };
+    let mut racks = Vec::new();
+    let mut from: Option<(f64, [f64; 2])> = None;
+    for (t, row) in series.t.iter().zip(&series.value) {
+        let ways = [way(row, *left), way(row, *right)];
+        if ways.iter().any(|way| !way.is_finite()) {
+            continue;
+        }
+        let (at, [l, r]) = match from {
+            _ if reports => (*t, ways),
+            None => {
+                from = Some((*t, ways));
+                continue;
+            }
+            Some((before, _)) if t - before < COMPARED => continue,
+            Some((before, earlier)) => {
+                from = Some((*t, ways));
+                (0.5 * (t + before), [ways[0] - earlier[0], ways[1] - earlier[1]])
+            }
+        };
+        let mean = 0.5 * (l + r);
+        // A car that stands keeps its wheels where they were.
+        if mean.abs() > 1e-3 * vehicle.radius[*left] {
+            let value =
+                math::atan(vehicle.wheelbase * (r - l) / (track * mean)).clamp(-LARGEST, LARGEST);
+            racks.push(Sample { t: at, value });
+        }
+    }
+    racks
 }

@@ -21,8 +21,12 @@ pub(crate) struct Shapes {
 
 /// All groups that the bench's runs can show.
 pub(crate) fn shapes(bench: &Bench<'_>) -> Vec<Shapes> {
+    // Of motor and rack nothing is known where they are what was measured.
+    let shown =
+        |entry: &Entry| !(bench.only_follows() && matches!(entry, Entry::Speed | Entry::Rack));
     let pairs: Vec<(Entry, Axis)> = Entry::all()
         .into_iter()
+        .filter(shown)
         .flat_map(|entry| Axis::ALL.into_iter().map(move |axis| (entry, axis)))
         .filter(|(entry, axis)| {
             *axis != Axis::Turn || matches!(entry, Entry::Wheel(_) | Entry::Curvature | Entry::Slip)
