@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use kerbside_recordings::run_folder::RunError;
 use kerbside_settings::{Parking, Problem, SettingsError, Severity, Sources, Stack};
 use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
 
@@ -60,6 +61,18 @@ impl From<SettingsError> for Failure {
             return Self::new(exit, error);
         }
         Self { exit, report: miette::Report::new(Refused::new(error.problems())) }
+    }
+}
+
+/// A run folder that is not as the format says: where a file of it has problems, every one.
+#[must_use]
+pub fn refused_run(error: RunError) -> Failure {
+    match error {
+        RunError::About(error) if !error.problems().is_empty() => {
+            let report = miette::Report::new(Refused::new(error.problems()));
+            Failure { exit: Exit::Data, report }
+        }
+        error => Failure::new(Exit::Data, error),
     }
 }
 

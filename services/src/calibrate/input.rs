@@ -4,10 +4,10 @@ use std::path::Path;
 
 use kerbside_calibration::{ReferencePose, Run, Series};
 use kerbside_geometry::{Vehicle, WHEELS, Wheel};
-use kerbside_recordings::run_folder::{self, RunError};
+use kerbside_recordings::run_folder;
 use kerbside_settings::{VehicleFile, parse_vehicle};
 
-use crate::configuration::{self, Refused};
+use crate::configuration::{self, refused_run as refused};
 use crate::exit::{Exit, Failure};
 
 /// A case, read.
@@ -143,14 +143,4 @@ fn reference(recorded: &run_folder::Run) -> Vec<ReferencePose> {
 fn series(readings: impl Iterator<Item = (f64, f64)>) -> Series {
     let (t, value) = readings.unzip();
     Series { t, value }
-}
-
-fn refused(error: RunError) -> Failure {
-    match error {
-        RunError::About(error) if !error.problems().is_empty() => {
-            let report = miette::Report::new(Refused::new(error.problems()));
-            Failure { exit: Exit::Data, report }
-        }
-        error => Failure::new(Exit::Data, error),
-    }
 }

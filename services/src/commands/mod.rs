@@ -14,11 +14,13 @@ use kerbside_runtime::Instance;
 
 use crate::calibrate::CalibrateArgs;
 use crate::compare::CompareVerb;
+use crate::diagnose::DiagnoseArgs;
 use crate::exit::{Exit, Failure};
 use crate::park::ParkArgs;
 use crate::replay::ReplayArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::service::{Service, ServiceArgs};
+use crate::simulate::SimulateArgs;
 use crate::vehicle::VehicleArgs;
 use crate::{
     actuation, estimator, ingest, interface, logging, park, planner, recorder, tracker, vehicle,
@@ -75,6 +77,14 @@ enum Verb {
     /// Identify radii, tracks, wheelbase and steering offset from recorded runs, and write them down.
     #[command(after_help = "Example: kerbside calibrate CASE --leave-out straight-5,circle-5")]
     Calibrate(CalibrateArgs),
+    /// Predict from commands what every sensor of recorded runs shows, with effects added to the vehicle or without.
+    #[command(
+        after_help = "Example: kerbside simulate CASE --runs CASE/holdout --model overlay.toml --out /tmp/after"
+    )]
+    Simulate(SimulateArgs),
+    /// Say where simulator and vehicle part, which effect causes it, and how far the gap shrinks.
+    #[command(after_help = "Example: kerbside diagnose CASE --out /tmp/diagnosis")]
+    Diagnose(DiagnoseArgs),
     /// Repeat the paper's experiments on the proving ground, and hold them against what they are to show.
     #[command(after_help = "Example: kerbside reproduce --trials 400 --out /tmp/paper")]
     Reproduce(ReproduceArgs),
@@ -147,6 +157,14 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
         Verb::Calibrate(args) => {
             logging::start("calibrate", level.unwrap_or("warn"), false);
             crate::calibrate::run(args)
+        }
+        Verb::Simulate(args) => {
+            logging::start("simulate", level.unwrap_or("warn"), false);
+            crate::simulate::run(args)
+        }
+        Verb::Diagnose(args) => {
+            logging::start("diagnose", level.unwrap_or("warn"), false);
+            crate::diagnose::run(args)
         }
         Verb::Reproduce(args) => {
             logging::start("reproduce", level.unwrap_or("warn"), false);

@@ -18,6 +18,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("refused.html", samples::refused().render()?),
         ("calibrated.html", samples::calibrated().render()?),
         ("not-calibrated.html", samples::uncalibrated().render()?),
+        ("diagnosed.html", samples::diagnosed().render()?),
+        ("ambiguous.html", samples::ambiguous().render()?),
+        ("no-gap.html", samples::no_gap().render()?),
+        ("unknown.html", samples::unknown().render()?),
+        ("mistaken.html", samples::mistaken().render()?),
         ("parked.svg", samples::parked().picture()),
     ];
     for (name, text) in files {

@@ -90,6 +90,33 @@ pub fn three_digits(value: f64) -> String {
     if text == "0.00" { "0".to_owned() } else { text }
 }
 
+/// `value` with so many significant digits, written out as decimals; places before the point all stay.
+#[must_use]
+pub fn significant(value: f64, digits: usize) -> String {
+    fixed(value, decimals_of(value, digits))
+}
+
+/// A value to two digits of the half width of its interval, and the interval: 0.61 (0.52 to 0.70).
+#[must_use]
+pub fn interval([value, low, high]: [f64; 3]) -> String {
+    let half = 0.5 * (high - low);
+    let decimals =
+        if half > 0.0 && half.is_finite() { decimals_of(half, 2) } else { decimals_of(value, 4) };
+    let [value, low, high] = [value, low, high].map(|value| fixed(value, decimals));
+    format!("{value} ({low} to {high})")
+}
+
+/// Decimals that show so many digits of `value`.
+fn decimals_of(value: f64, digits: usize) -> usize {
+    let size = value.abs();
+    if !(size > 0.0 && size.is_finite()) {
+        return digits.saturating_sub(1);
+    }
+    // The slack forgives the last bit of the logarithm at exact powers of ten; `as` saturates.
+    let first = (log10(size) + 1e-9).floor();
+    (digits as f64 - 1.0 - first).clamp(0.0, 12.0) as usize
+}
+
 /// A share in per cent.
 #[must_use]
 pub fn percent(share: f64) -> String {
@@ -165,6 +192,18 @@ mod tests {
         assert_eq!(millimetres(-0.0123), "\u{2212}12.3\u{202f}mm");
         assert_eq!(degrees(core::f64::consts::FRAC_PI_2), "+90.00\u{202f}deg");
         assert_eq!(optional(None, metres), UNKNOWN);
+    }
+
+    #[test]
+    fn digits_follow_what_is_known() {
+        assert_eq!(significant(0.012_34, 2), "0.012");
+        assert_eq!(significant(0.1, 2), "0.10");
+        assert_eq!(significant(-123.4, 2), "\u{2212}123");
+        assert_eq!(significant(0.0, 3), "0.00");
+        assert_eq!(significant(f64::NAN, 3), UNKNOWN);
+        assert_eq!(interval([0.612, 0.52, 0.703]), "0.612 (0.520 to 0.703)");
+        assert_eq!(interval([0.05, 0.05, 0.05]), "0.05000 (0.05000 to 0.05000)");
+        assert_eq!(interval([0.2, 0.1, f64::INFINITY]), "0.2000 (0.1000 to \u{2013})");
     }
 
     #[test]

@@ -9,12 +9,14 @@
 //! - [`svg`]: figures. A [`svg::Map`] in metres with equal scales, a [`svg::Chart`] of traces over
 //!   a common axis, [`svg::latency_histogram`] and [`svg::latency_tail`] on logarithmic axes.
 //! - [`page`]: what a page is made of: a verdict, sections, key figures, tables, facts, figures.
-//! - [`ParkReport`], [`ReplayReport`], [`CalibrateReport`] and [`ReproductionReport`]: plain data in, a page out.
+//! - [`ParkReport`], [`ReplayReport`], [`CalibrateReport`], [`DiagnoseReport`] and [`ReproductionReport`]: plain
+//!   data in, a page out.
 //!
 //! Lengths are metres, angles radians, times seconds since the run's start, unless a name says
 //! else. Figures that are not finite are shown as a dash; they never reach the drawing.
 
 mod calibrate;
+mod diagnose;
 mod error;
 pub mod format;
 pub mod page;
@@ -29,6 +31,7 @@ pub use calibrate::{
     CalibrateReport, CalibratedParameter, DerivedFigure, EndErrors, ReckonedPath, RunNote,
     RunPaths, RunResidual,
 };
+pub use diagnose::DiagnoseReport;
 pub use error::ReportError;
 pub use park::{
     CommandSample, EstimateSample, Event, EventKind, Figures, JudgedOn, Latency, Outcome,

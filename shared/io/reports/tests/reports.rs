@@ -16,6 +16,11 @@ fn pages() -> Vec<(&'static str, String)> {
         ("refused", samples::refused().render().unwrap()),
         ("calibrated", samples::calibrated().render().unwrap()),
         ("not calibrated", samples::uncalibrated().render().unwrap()),
+        ("diagnosed", samples::diagnosed().render().unwrap()),
+        ("ambiguous", samples::ambiguous().render().unwrap()),
+        ("no gap", samples::no_gap().render().unwrap()),
+        ("unknown", samples::unknown().render().unwrap()),
+        ("mistaken", samples::mistaken().render().unwrap()),
     ]
 }
 
@@ -267,6 +272,68 @@ fn a_calibration_page_says_what_it_must() {
     }
     let page = samples::uncalibrated().render().unwrap();
     assert!(page.contains("Not good.") && page.contains("These runs identify nothing."), "{page}");
+}
+
+#[test]
+fn a_diagnosis_says_where_which_how_far_and_what_next() {
+    let page = samples::diagnosed().render().unwrap();
+    for word in [
+        "Several effects.",
+        "steering offset and speed gain",
+        "Gap removed",
+        "96.0\u{202f}%",
+        "<text class=\"row-name\"",
+        "not measured",
+        "slalom-1, distance from the measured path",
+        "0.0220 (0.0205 to 0.0235)",
+        "acceleration slip",
+        "The verdict&#39;s nearest rival is",
+        "Nothing is left that another manoeuvre would separate.",
+        "kerbside diagnose cases/car",
+    ] {
+        assert!(page.contains(word), "{word:?} is missing");
+    }
+    let page = samples::ambiguous().render().unwrap();
+    for word in ["Not decided.", "understeer or steering compliance", "next.csv", "circle"] {
+        assert!(page.to_lowercase().contains(&word.to_lowercase()), "{word:?} is missing");
+    }
+    let page = samples::no_gap().render().unwrap();
+    assert!(page.contains("No gap.") && page.contains("Nowhere"));
+    let page = samples::unknown().render().unwrap();
+    assert!(page.contains("Unknown cause.") && page.contains("would be a guess"));
+    let page = samples::mistaken().render().unwrap();
+    assert!(page.contains("A mistake.") && page.contains("yaw rate has the wrong sign"));
+}
+
+/// The excess of a link is drawn beyond what is allowed, and only of a link that has one.
+#[test]
+fn the_chain_shows_excess_where_there_is_one() {
+    let chain = |page: String| {
+        let figure = page.split("<figure id=\"chain\">").nth(1).unwrap().to_owned();
+        // The legend shows the mark once.
+        figure.split("</figure>").next().unwrap().matches("bar vermilion").count() - 1
+    };
+    assert_eq!(chain(samples::diagnosed().render().unwrap()), 2);
+    assert_eq!(chain(samples::no_gap().render().unwrap()), 0);
+}
+
+#[test]
+fn a_diagnosis_of_many_long_runs_stays_small() {
+    let mut report = samples::diagnosed();
+    let run = report.diagnosis.paths[0].clone();
+    for number in 0..60 {
+        let mut run = run.clone();
+        run.name = format!("run-{number}");
+        for _ in 0..4 {
+            run.map.extend(run.map.clone());
+            run.measured.extend(run.measured.clone());
+        }
+        report.diagnosis.paths.push(run);
+    }
+    let points: usize = report.diagnosis.paths.iter().map(|run| run.map.len()).sum();
+    assert!(points > 100_000, "{points}");
+    let page = report.render().unwrap();
+    assert!(page.len() < 1_500_000, "{} bytes", page.len());
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Configuration in TOML: declared once, checked, explained.
 //!
-//! Four kinds of files: `stack.toml` (how the processes behave), `vehicles/NAME.toml` (what the
-//! vehicle is believed to be), `scenarios/NAME.toml` (where to park) and `run.toml` (about a
-//! recorded run). Each key is declared in one place with type, unit, range, default and prose; from
+//! Five kinds of files: `stack.toml` (how the processes behave), `vehicles/NAME.toml` (what the
+//! vehicle is believed to be), `scenarios/NAME.toml` (where to park), `run.toml` (about a recorded
+//! run) and overlays (effects to be added to a vehicle). Each key is declared in one place with type, unit, range, default and prose; from
 //! that come reading and checking, the text of every error, [`explain()`], the [`reference()`] page
 //! and [`Loaded::show`].
 //!
@@ -19,6 +19,7 @@ mod check;
 mod declare;
 mod explain;
 mod open;
+mod overlay;
 mod problem;
 mod run;
 mod scenario;
@@ -33,6 +34,7 @@ pub use declare::{
 };
 pub use explain::{declarations, explain, explain_all, reference};
 pub use open::{Parking, load_run, load_vehicle, parse_run, parse_vehicle};
+pub use overlay::{load_overlay, parse_overlay};
 pub use problem::{Cause, Problem, SettingsError, Severity};
 pub use run::RunInfo;
 pub use scenario::{Disturbance, Gear, Obstacle, PlanLimits, Scenario, Tolerance};
@@ -42,4 +44,4 @@ pub use stack::{
     REAL_TIME_TIMEOUTS, RealtimeMode, RealtimeSettings, RecorderSettings, Stack, Start,
     scaled_tracker,
 };
-pub use vehicle::{CALIBRATED, Calibration, EFFECTS, Uncertainty, VehicleFile};
+pub use vehicle::{CALIBRATED, Calibration, Uncertainty, VehicleFile};

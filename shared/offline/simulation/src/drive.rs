@@ -87,3 +87,102 @@ impl Follow<'_> {
 fn check(step: f64) {
     assert!(step > 0.0, "a step of {step} s never ends");
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Parameter;
+    use crate::simulator::STEP;
+
+    const COMMANDS: [Command; 3] = [
+        Command { t: 0.2, speed: 0.4, steering: 0.3 },
+        Command { t: 3.01, speed: -0.3, steering: -0.2 },
+        Command { t: 7.0, speed: 0.0, steering: 0.0 },
+    ];
+
+    /// A car whose ground does everything that depends on motor and rack alone.
+    fn effects() -> Effects {
+        let parameter = |id, name| Parameter::find(id, name).unwrap();
+        Effects::NEUTRAL
+            .with(parameter("understeer", "gradient"), 1.5)
+            .with(parameter("acceleration_slip", "rate"), 0.3)
+            .with(parameter("lateral_drift", "rate"), 0.03)
+            .with(parameter("drive_slip", "ratio"), 0.05)
+            .with(parameter("reference_delay", "delay"), 0.1)
+    }
+
+    #[test]
+    fn to_follow_what_motor_and_rack_did_repeats_the_drive() {
+        let (vehicle, start) = (Vehicle::paper_car(), Pose::new(0.2, -0.1, 0.4));
+        let (mut driven, mut followed) = (Trajectory::new(), Trajectory::new());
+        let drive =
+            Drive { vehicle: &vehicle, effects: effects(), commands: &COMMANDS, start, step: STEP };
+        drive.trajectory(10.0, &mut driven);
+        let samples = |value: fn(&crate::Knot) -> f64| -> Vec<Sample> {
+            driven.knots().iter().map(|knot| Sample { t: knot.time, value: value(knot) }).collect()
+        };
+        let (speeds, racks) = (samples(|knot| knot.motor_speed), samples(|knot| knot.rack));
+        let follow = Follow {
+            vehicle: &vehicle,
+            effects: effects(),
+            speeds: &speeds,
+            racks: &racks,
+            start,
+            step: STEP,
+        };
+        follow.trajectory(10.0, &mut followed);
+        for step in 0..100 {
+            let t = f64::from(step) * 0.1;
+            let error = followed.reference(t).seen_from(&driven.reference(t));
+            // What straight lines between samples of 5 ms lose.
+            assert!(error.x.abs() + error.y.abs() + error.yaw.abs() < 1e-5, "{t}: {error:?}");
+            for wheel in 0..4 {
+                assert!((followed.rotation(t)[wheel] - driven.rotation(t)[wheel]).abs() < 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn few_samples_are_joined_by_lines_and_hold_at_both_ends() {
+        let vehicle = Vehicle::paper_car();
+        let speeds = [Sample { t: 1.0, value: 0.2 }, Sample { t: 3.0, value: -0.2 }];
+        let follow = Follow {
+            vehicle: &vehicle,
+            effects: Effects::NEUTRAL,
+            speeds: &speeds,
+            racks: &[],
+            start: Pose::default(),
+            step: 0.02,
+        };
+        let mut trajectory = Trajectory::new();
+        follow.trajectory(4.0, &mut trajectory);
+        for (t, x) in [(0.0, 0.0), (0.5, 0.1), (1.0, 0.2), (2.0, 0.3), (3.0, 0.2), (4.0, 0.0)] {
+            assert!((trajectory.pose(t).x - x).abs() < 1e-9, "{t}: {:?}", trajectory.pose(t));
+        }
+        assert_eq!(trajectory.pose(-1.0), Pose::default(), "before 0 as at 0");
+        assert_eq!(trajectory.pose(9.0), trajectory.pose(4.0), "after the end as there");
+        assert_eq!(trajectory.pose(f64::NAN), Pose::default());
+        assert_eq!(Trajectory::new().pose(1.0), Pose::default());
+    }
+
+    #[test]
+    fn a_coarser_step_shows_the_same_drive() {
+        let vehicle = Vehicle::paper_car();
+        let shown = |step: f64| {
+            let drive = Drive {
+                vehicle: &vehicle,
+                effects: effects(),
+                commands: &COMMANDS,
+                start: Pose::default(),
+                step,
+            };
+            let mut trajectory = Trajectory::new();
+            drive.trajectory(10.0, &mut trajectory);
+            (0..997).map(|row| trajectory.reference(f64::from(row) * 0.01)).collect::<Vec<_>>()
+        };
+        for (fine, coarse) in shown(0.001).iter().zip(shown(0.02)) {
+            let error = coarse.seen_from(fine);
+            assert!(error.x.abs() + error.y.abs() + error.yaw.abs() < 2e-5, "{error:?}");
+        }
+    }
+}

@@ -4,8 +4,8 @@ use kerbside_geometry::{Drive, WHEELS, Wheel, math};
 
 use crate::plant::Contact;
 
-/// Relative size of a correction at which a ground speed counts as found.
-const FOUND: f64 = 1e-12;
+/// Relative error of the driven wheels' rotation at which a ground speed counts as found.
+const FOUND: f64 = 1e-13;
 /// Newton needs three or four; more are for parameters that no vehicle has.
 const CORRECTIONS: usize = 30;
 
@@ -39,6 +39,8 @@ pub(crate) struct Ground {
     /// Share of each wheel in the mean rotation rate of the driven ones.
     driven: [f64; 4],
     driven_radius: f64,
+    /// Mean rotation of the driven wheels per metre straight ahead \[rad/m\].
+    straight: f64,
     offset: f64,
     compliance: f64,
     understeer: f64,
@@ -57,11 +59,14 @@ struct Rolling {
 impl Ground {
     /// The ground under a vehicle.
     pub(crate) fn new(contact: &Contact) -> Self {
+        let per_radius = contact.radius.map(|radius| 1.0 / radius);
+        let driven = WHEELS.map(|wheel| share(contact.drive, wheel));
         Self {
             wheelbase: contact.wheelbase,
+            straight: (0..4).map(|wheel| driven[wheel] * per_radius[wheel]).sum(),
             position: WHEELS.map(|wheel| position(contact, wheel)),
-            per_radius: contact.radius.map(|radius| 1.0 / radius),
-            driven: WHEELS.map(|wheel| share(contact.drive, wheel)),
+            per_radius,
+            driven,
             driven_radius: contact.driven_radius,
             offset: contact.offset,
             compliance: contact.compliance,
@@ -119,20 +124,19 @@ impl Ground {
     /// method on V r D(k(V)) = motor, r the driven radius and D the driven wheels' mean rotation
     /// per metre.
     fn yielding(&self, motor: f64, angle: f64, stiff: f64) -> (f64, f64, Rolling) {
-        let mut curvature = stiff;
+        let turns = motor / self.driven_radius;
+        let mut speed = turns / self.straight;
+        let (mut curvature, mut slope) = self.curvature(speed, angle, stiff);
         let mut rolling = self.rolling(curvature);
-        let mut speed = motor / (self.driven_radius * rolling.driven);
         for _ in 0..CORRECTIONS {
-            let slope;
-            (curvature, slope) = self.curvature(speed, angle, stiff);
-            rolling = self.rolling(curvature);
-            let excess = speed * rolling.driven - motor / self.driven_radius;
-            let correction =
-                excess / (rolling.driven + speed * self.driven_slope(curvature, &rolling) * slope);
-            speed -= correction;
-            if correction.abs() <= FOUND * speed.abs() {
+            let excess = speed * rolling.driven - turns;
+            if excess.abs() <= FOUND * turns.abs() {
                 break;
             }
+            speed -=
+                excess / (rolling.driven + speed * self.driven_slope(curvature, &rolling) * slope);
+            (curvature, slope) = self.curvature(speed, angle, stiff);
+            rolling = self.rolling(curvature);
         }
         (speed, curvature, rolling)
     }

@@ -4,6 +4,9 @@ use kerbside_geometry::{Drive, Pose, Vehicle};
 
 use crate::effects::Effects;
 
+/// No actuator is slower than that \[1/s\]: one that never moves would never be done.
+const SLOWEST: f64 = 1e-6;
+
 /// What a vehicle is once every effect had its say. An effect alters these numbers; what they mean
 /// is told by the station that uses them.
 #[derive(Clone, Debug)]
@@ -120,6 +123,7 @@ impl Plant {
         for actuation in [&mut plant.speed, &mut plant.steering] {
             actuation.delay = actuation.delay.max(0.0);
             actuation.lag = actuation.lag.max(0.0);
+            actuation.rate_limit = actuation.rate_limit.max(SLOWEST);
         }
         plant
     }

@@ -151,13 +151,20 @@ pub fn is_run(folder: &Path) -> bool {
 /// # Errors
 /// [`RunError::Io`] where the operating system refuses.
 pub fn runs_of(folder: &Path) -> Result<Vec<PathBuf>, RunError> {
-    let runs = folder.join("runs");
+    runs_in(&folder.join("runs"))
+}
+
+/// The run folders in the folder `runs`, by name; none where there is no such folder.
+///
+/// # Errors
+/// [`RunError::Io`] where the operating system refuses.
+pub fn runs_in(runs: &Path) -> Result<Vec<PathBuf>, RunError> {
     if !runs.is_dir() {
         return Ok(Vec::new());
     }
-    let io = |source| RunError::Io { path: runs.clone(), source };
+    let io = |source| RunError::Io { path: runs.to_owned(), source };
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(&runs).map_err(io)? {
+    for entry in std::fs::read_dir(runs).map_err(io)? {
         let path = entry.map_err(io)?.path();
         if is_run(&path) {
             found.push(path);

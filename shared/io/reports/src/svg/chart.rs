@@ -4,7 +4,7 @@ use super::axes::Axes;
 use super::band::curve;
 use super::canvas::{Canvas, closed_path_data, path_data};
 use super::figure::{Frame, Plot};
-use super::{Band, Figure, Legend, Line, Range, Scale, Ticks, Tone};
+use super::{Band, Figure, Ink, Legend, Line, Range, Scale, Ticks, Tone};
 
 /// A chart. Fill in what it needs, leave the rest to `..Chart::default()`.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +41,19 @@ pub struct Chart {
     pub marks: Vec<Mark>,
     /// Horizontal lines of limits.
     pub limits: Vec<f64>,
+    /// Points that no line joins, below all traces.
+    pub clouds: Vec<Cloud>,
+}
+
+/// Points that no line joins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cloud {
+    /// For the legend.
+    pub label: String,
+    /// Colour.
+    pub ink: Ink,
+    /// (x, y) in any order; what is not finite is left out.
+    pub points: Vec<[f64; 2]>,
 }
 
 /// A curve.
@@ -97,6 +110,7 @@ impl Default for Chart {
             spans: Vec::new(),
             marks: Vec::new(),
             limits: Vec::new(),
+            clouds: Vec::new(),
         }
     }
 }
@@ -106,6 +120,8 @@ const HEIGHT: f64 = 240.0;
 const PLOT: Plot = Plot { left: 52.0, top: 18.0, width: 440.0, height: 186.0 };
 /// About how wide a letter is, in figure units.
 const LETTER: f64 = 6.2;
+/// Points of the largest cloud drawn.
+const DOTS: usize = 1500;
 
 impl Chart {
     /// Draws it.
@@ -149,6 +165,7 @@ impl Chart {
             draw_path(canvas, &format!("band {}", band.ink.class()), &data);
         }
         self.draw_limits(canvas, y);
+        self.draw_clouds(canvas, x, y);
         for trace in &self.traces {
             draw_path(canvas, &trace.line.class(), &path_data(&curve(&trace.points, x, y)));
         }
@@ -198,6 +215,20 @@ impl Chart {
         }
     }
 
+    /// A point is a line of no length with round ends: a cloud is one path.
+    fn draw_clouds(&self, canvas: &mut Canvas, x: &Scale, y: &Scale) {
+        for cloud in &self.clouds {
+            let at = cloud.points.iter().map(|point| [x.at(point[0]), y.at(point[1])]);
+            let seen = at.filter(|point| point.iter().all(|value| value.is_finite()));
+            let points: Vec<_> = seen.map(|point| vec![point, point]).collect();
+            // More than that and a reader sees a blot, whatever is drawn.
+            let every = points.len().div_ceil(DOTS).max(1);
+            let thinned: Vec<_> = points.into_iter().step_by(every).collect();
+            let class = format!("cloud {}", cloud.ink.class());
+            draw_path(canvas, &class, &path_data(&thinned));
+        }
+    }
+
     /// Labels of marks go to rows below one another, so that near marks stay readable.
     fn draw_marks(&self, canvas: &mut Canvas, x: &Scale) {
         for (index, mark) in self.marks.iter().enumerate() {
@@ -224,7 +255,9 @@ impl Chart {
             .bands
             .iter()
             .map(|band| Legend::class(&band.label, &format!("band {}", band.ink.class())));
-        traces.chain(bands).filter(|entry| !entry.label.is_empty()).collect()
+        let clouds = self.clouds.iter().map(|cloud| Legend::dot(&cloud.label, cloud.ink));
+        let all = traces.chain(clouds).chain(bands);
+        all.filter(|entry| !entry.label.is_empty()).collect()
     }
 
     fn xs(&self) -> impl Iterator<Item = f64> + '_ {
@@ -232,7 +265,8 @@ impl Chart {
         let bands = self.bands.iter().flat_map(|band| &band.points);
         let bars = self.bars.iter().flat_map(|bar| [bar[0], bar[1]]);
         let curves = traces.map(|point| point[0]).chain(bands.map(|point| point[0]));
-        curves.chain(bars).filter(|x| x.is_finite())
+        let clouds = self.clouds.iter().flat_map(|cloud| &cloud.points).map(|point| point[0]);
+        curves.chain(bars).chain(clouds).filter(|x| x.is_finite())
     }
 
     /// Heights of everything that `x` shows.
@@ -243,7 +277,9 @@ impl Chart {
         let bands = bands.filter(move |point| x.holds(point[0]));
         let bands = bands.flat_map(|point| [point[1], point[2]]);
         let bars = self.bars.iter().map(|bar| bar[2]);
-        traces.chain(bands).chain(bars).chain(self.limits.iter().copied())
+        let clouds = self.clouds.iter().flat_map(|cloud| &cloud.points);
+        let clouds = clouds.filter(move |point| x.holds(point[0])).map(|point| point[1]);
+        traces.chain(bands).chain(bars).chain(clouds).chain(self.limits.iter().copied())
     }
 
     fn x_scale(&self) -> Scale {
@@ -273,7 +309,6 @@ fn draw_path(canvas: &mut Canvas, class: &str, data: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::svg::Ink;
 
     fn chart(points: Vec<[f64; 2]>) -> Chart {
         let trace = Trace { label: "speed".to_owned(), line: Line::new(Ink::Blue), points };
@@ -288,6 +323,19 @@ mod tests {
         };
         let shown = chart.y_scale(chart.x_scale().values()).values();
         assert!(shown.holds(-1.0) && shown.holds(3.0) && shown.high() < 5.0, "{shown:?}");
+    }
+
+    #[test]
+    fn a_cloud_is_drawn_thin_and_counts_for_the_axes() {
+        let points = (0..20_000).map(|i| [f64::from(i), f64::from(i % 7)]).collect();
+        let cloud = Cloud { label: "before".to_owned(), ink: Ink::Orange, points };
+        let chart = Chart { clouds: vec![cloud], ..chart(vec![[0.0, 0.0]]) };
+        assert!(chart.x_scale().values().holds(19_999.0));
+        let figure = chart.figure();
+        let data = figure.svg.split("class=\"cloud orange\" d=\"").nth(1).unwrap();
+        let dots = data.split('"').next().unwrap().matches('M').count();
+        assert!((100..=DOTS).contains(&dots), "{dots}");
+        assert_eq!(figure.legend.len(), 2);
     }
 
     #[test]

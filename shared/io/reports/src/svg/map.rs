@@ -60,6 +60,11 @@ impl Map {
         self.view = Some([x, y]);
     }
 
+    /// Keeps the drawing within a height, in figure units of which the page is 760 wide.
+    pub fn keep_within(&mut self, height: f64) {
+        self.tallest = self.tallest.min(height);
+    }
+
     /// An area within corners (x, y).
     pub fn polygon(&mut self, corners: &[[f64; 2]], area: Area) {
         self.shapes.push(Shape::Polygon { corners: corners.to_vec(), area });

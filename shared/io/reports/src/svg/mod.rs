@@ -13,16 +13,18 @@ mod figure;
 mod latency;
 mod map;
 mod range;
+mod rows;
 mod scale;
 mod style;
 
 pub use band::Band;
-pub use chart::{Chart, Mark, Span, Trace};
+pub use chart::{Chart, Cloud, Mark, Span, Trace};
 pub use decimate::{envelope, simplify};
 pub use figure::{Figure, Legend};
 pub use latency::{latency_histogram, latency_tail};
 pub use map::Map;
 pub use range::Range;
+pub use rows::{Bar, BarRow, Cell, Panel, RowWeight, Rows};
 pub use scale::{Scale, Tick, Ticks};
 pub use style::{Area, Dash, Ink, Line, Tone, Weight};
 

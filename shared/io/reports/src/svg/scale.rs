@@ -108,13 +108,17 @@ fn log_ticks(values: Range, kind: Ticks, count: usize) -> Vec<Tick> {
     let first = (log10(values.low()) - 1e-9).floor();
     let decades = (log10(values.high()) + 1e-9).ceil() - first;
     let stride = (decades / count.max(1) as f64).ceil().max(1.0);
+    // Where hardly a decade is seen, its parts are named, too.
+    let has_few = decades <= 2.0 && log10(values.high() / values.low()) < 1.8;
     let mut ticks = Vec::new();
     for decade in 0..=decades.min(400.0) as u32 {
         let power = exp10(first + f64::from(decade));
         let is_labelled = f64::from(decade) % stride == 0.0;
         push_log_tick(&mut ticks, values, power, is_labelled.then_some(kind));
         for factor in 2..10_u32 {
-            push_log_tick(&mut ticks, values, power * f64::from(factor), None);
+            let is_labelled = has_few && matches!(factor, 2 | 5) && kind == Ticks::Log;
+            let label = is_labelled.then_some(kind);
+            push_log_tick(&mut ticks, values, power * f64::from(factor), label);
         }
     }
     ticks
@@ -187,6 +191,8 @@ mod tests {
         );
         let number = Scale::new(Ticks::Log, Range::new(0.01, 100.0), 0.0, 1.0);
         assert_eq!(labels(&number.ticks(8)), ["0.01", "0.1", "1", "10", "100"]);
+        let short = Scale::new(Ticks::Log, Range::new(0.25, 8.0), 0.0, 1.0);
+        assert_eq!(labels(&short.ticks(8)), ["0.5", "1", "2", "5"]);
     }
 
     #[test]

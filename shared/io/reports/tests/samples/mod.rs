@@ -1,5 +1,8 @@
 //! Made-up runs that look like real ones: for tests, and for looking at.
 
+mod diagnosed;
+
+pub(crate) use diagnosed::{ambiguous, diagnosed, mistaken, no_gap, unknown};
 use kerbside_geometry::{Footprint, Pose, Wheel, math};
 use kerbside_reports::svg::Tone;
 use kerbside_reports::{

@@ -251,7 +251,7 @@ fn integer(digits: &DeInteger<'_>) -> Option<i64> {
 }
 
 #[allow(clippy::cast_precision_loss)] // A length of 2^53 m is out of every range.
-fn number(found: &DeValue<'_>) -> Option<f64> {
+pub(crate) fn number(found: &DeValue<'_>) -> Option<f64> {
     match found {
         DeValue::Integer(digits) => integer(digits).map(|number| number as f64),
         DeValue::Float(digits) => digits.as_str().parse().ok(),

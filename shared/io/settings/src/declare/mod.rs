@@ -11,6 +11,7 @@ mod schema;
 mod show;
 mod value;
 
+pub(crate) use kind::number;
 pub use kind::{Kind, Range};
 pub(crate) use nearest::nearest;
 pub(crate) use reading::{Reading, SourceFile};

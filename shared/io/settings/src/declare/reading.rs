@@ -34,7 +34,7 @@ impl SourceFile {
     }
 
     /// The text of a span, shortened to a glance.
-    fn excerpt(&self, span: &Range<usize>) -> String {
+    pub(crate) fn excerpt(&self, span: &Range<usize>) -> String {
         let text = self.text.get(span.clone()).unwrap_or_default();
         let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
         match words.char_indices().nth(60) {

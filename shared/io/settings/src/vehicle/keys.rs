@@ -7,8 +7,9 @@ use std::sync::LazyLock;
 use kerbside_geometry::{
     Actuators, Drive, Footprint, Gyro, Limits, Pose, Reference, SteeringSensor, WHEELS,
 };
+use kerbside_simulation::effects::library;
 
-use super::{Calibration, EFFECTS, calibration};
+use super::{Calibration, calibration};
 use crate::declare::{Field, Kind, Range, Schema, Value};
 
 /// A vehicle as far as its file states it; what is not stated is NaN.
@@ -345,14 +346,15 @@ fn declare_uncertainty(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {
         "uncertainty.effect",
         "The same for what has no field: parameters of effects, about their neutral value.",
     );
-    for (id, parameters) in EFFECTS {
-        for parameter in *parameters {
+    for definition in library() {
+        for parameter in definition.parameters {
+            let (id, parameter) = (definition.id, parameter.name);
             schema = schema.optional(
                 format!("uncertainty.effect.{id}.{parameter}"),
                 Kind::unit("the parameter's unit", Range::from(0.0).to(1000.0)),
                 "taken as neutral",
                 format!("Standard deviation of {parameter} of the effect {id}."),
-                move |v: &mut VehicleDraft| v.effects.entry((*id, *parameter)).or_default(),
+                move |v: &mut VehicleDraft| v.effects.entry((id, parameter)).or_default(),
             );
         }
     }

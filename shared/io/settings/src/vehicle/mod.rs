@@ -3,7 +3,6 @@
 mod build;
 mod calibration;
 mod checks;
-mod effects;
 mod keys;
 
 use std::collections::BTreeMap;
@@ -16,7 +15,6 @@ use crate::problem::Cause;
 use crate::sources::{FileKind, Sources};
 
 pub use calibration::{CALIBRATED, Calibration};
-pub use effects::EFFECTS;
 pub(crate) use keys::{VehicleDraft, schema};
 
 /// A vehicle's file: the nominal vehicle, and how far a car in good order may differ from it.

@@ -23,3 +23,13 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.speed.rate_limit = plant.speed.rate_limit.min(values[0]);
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, gentle, steps, tests};
+
+    tests!(Trial {
+        begin: Some(&[0.25]),
+        ..Trial::of("acceleration_limit", &[0.12], steps, gentle)
+    });
+}

@@ -25,3 +25,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.acceleration_slip += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial::of("acceleration_slip", &[0.3], steps, standing));
+}

@@ -23,3 +23,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.sensors.clock_rate += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial::of("clock_drift", &[0.004], steps, standing));
+}

@@ -22,3 +22,15 @@ pub(super) const DEFINITION: Definition = Definition {
         (0..4).for_each(|wheel| plant.sensors.kept[wheel] *= 1.0 - values[wheel]);
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use kerbside_geometry::Wheel;
+
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial {
+        wheel: Some(Wheel::RearLeft),
+        ..Trial::of("count_loss", &[0.08], steps, standing)
+    });
+}

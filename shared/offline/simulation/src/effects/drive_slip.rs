@@ -23,3 +23,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.kept *= 1.0 - values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial::of("drive_slip", &[0.08], steps, standing));
+}

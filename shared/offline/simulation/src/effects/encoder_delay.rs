@@ -23,3 +23,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.sensors.encoder_delay += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial::of("encoder_delay", &[0.15], steps, standing));
+}

@@ -52,3 +52,14 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.patch = Patch { x, y, radius, kept: 1.0 - ratio };
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, shuttle, standing, tests};
+
+    tests!(Trial {
+        mirrored: &[0.6, -0.25, 0.35, 0.2],
+        begin: Some(&[0.63, 0.22, 0.38, 0.1]),
+        ..Trial::of("floor_patch", &[0.6, 0.25, 0.35, 0.2], shuttle, standing)
+    });
+}

@@ -41,3 +41,14 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.floor = (values[1] * cos, values[1] * sin);
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial {
+        mirrored: &[-2.1, 0.03],
+        begin: Some(&[1.0, 0.001]),
+        ..Trial::of("floor_slope", &[2.1, 0.03], steps, standing)
+    });
+}

@@ -22,3 +22,14 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.sensors.gyro_bias += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Seen, Trial, steps, tests};
+
+    tests!(Trial {
+        mirrored: &[0.02],
+        seen: Seen::NoGyro,
+        ..Trial::of("gyro_bias", &[-0.02], steps, steps)
+    });
+}

@@ -22,3 +22,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.sensors.gyro_gain *= values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("gyro_gain", &[1.06], steps, straight));
+}

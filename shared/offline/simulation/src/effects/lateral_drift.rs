@@ -24,3 +24,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.lateral_drift += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial { mirrored: &[0.03], ..Trial::of("lateral_drift", &[-0.03], steps, standing) });
+}

@@ -23,3 +23,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.lateral_slip += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("lateral_slip", &[0.3], steps, straight));
+}

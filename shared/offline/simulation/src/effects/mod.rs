@@ -11,6 +11,10 @@ mod definition;
 mod deviations;
 mod overlay;
 mod parameter;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
 mod values;
 
 mod acceleration_limit;
@@ -90,6 +94,9 @@ const LIBRARY: &[&Definition] = &[
     &reference_scale::DEFINITION,
     &reference_marker::DEFINITION,
     &clock_drift::DEFINITION,
+    // One that only the tests know, to show that this line is all it takes.
+    #[cfg(test)]
+    &tests::FRONT_WEAR,
 ];
 
 /// What a car in good order may differ by besides.

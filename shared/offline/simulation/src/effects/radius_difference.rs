@@ -36,3 +36,13 @@ pub(super) const DEFINITION: Definition = Definition {
         (0..4).for_each(|wheel| plant.contact.radius[wheel] *= factors[wheel]);
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial {
+        mirrored: &[0.02, -0.025],
+        ..Trial::of("radius_difference", &[-0.02, 0.025], steps, standing)
+    });
+}

@@ -23,3 +23,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.radius = plant.contact.radius.map(|radius| radius * values[0]);
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial::of("radius_scale", &[1.05], steps, standing));
+}

@@ -22,3 +22,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.sensors.reference_delay += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial::of("reference_delay", &[0.2], steps, standing));
+}

@@ -44,3 +44,14 @@ pub(super) const DEFINITION: Definition = Definition {
         marker.yaw += values[2];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Seen, Trial, steps, tests};
+
+    tests!(Trial {
+        mirrored: &[0.05, 0.04, -0.06],
+        seen: Seen::NoReference,
+        ..Trial::of("reference_marker", &[0.05, -0.04, 0.06], steps, steps)
+    });
+}

@@ -23,3 +23,13 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.sensors.reference_scale *= values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Seen, Trial, steps, tests};
+
+    tests!(Trial {
+        seen: Seen::NoReference,
+        ..Trial::of("reference_scale", &[0.97], steps, steps)
+    });
+}

@@ -25,3 +25,15 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.speed.dead_zone = values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, creeping, straight, tests};
+
+    tests!(Trial {
+        begin: Some(&[0.1]),
+        difference: 0.02,
+        tolerance: 0.02,
+        ..Trial::of("speed_dead_zone", &[0.13], creeping, straight)
+    });
+}

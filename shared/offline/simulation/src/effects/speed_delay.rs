@@ -22,3 +22,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.speed.delay += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial::of("speed_delay", &[0.17], steps, standing));
+}

@@ -25,3 +25,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.speed.gain *= values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial::of("speed_gain", &[0.88], steps, standing));
+}

@@ -24,3 +24,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.backlash = values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("steering_backlash", &[0.06], steps, straight));
+}

@@ -25,3 +25,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.compliance += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("steering_compliance", &[0.35], steps, straight));
+}

@@ -24,3 +24,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.steering.gain *= values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("steering_gain", &[1.2], steps, straight));
+}

@@ -22,3 +22,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.steering.lag += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("steering_lag", &[0.3], steps, straight));
+}

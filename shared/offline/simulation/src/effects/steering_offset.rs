@@ -23,3 +23,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.offset += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, standing, steps, tests};
+
+    tests!(Trial { mirrored: &[0.05], ..Trial::of("steering_offset", &[-0.05], steps, standing) });
+}

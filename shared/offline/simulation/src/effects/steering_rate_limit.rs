@@ -24,3 +24,13 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.steering.rate_limit = plant.steering.rate_limit.min(values[0]);
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, gentle, steps, tests};
+
+    tests!(Trial {
+        begin: Some(&[0.7]),
+        ..Trial::of("steering_rate_limit", &[0.2], steps, gentle)
+    });
+}

@@ -22,3 +22,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.sensors.steering_gain *= values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("steering_sensor_gain", &[0.9], steps, straight));
+}

@@ -22,3 +22,14 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.sensors.steering_offset += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Seen, Trial, steps, tests};
+
+    tests!(Trial {
+        mirrored: &[-0.03],
+        seen: Seen::NoSteeringSensor,
+        ..Trial::of("steering_sensor_offset", &[0.03], steps, steps)
+    });
+}

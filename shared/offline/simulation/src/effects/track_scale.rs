@@ -34,3 +34,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.track_rear *= values[1];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("track_scale", &[1.09, 0.93], steps, straight));
+}

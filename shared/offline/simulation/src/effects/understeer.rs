@@ -23,3 +23,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.understeer += values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("understeer", &[1.6], steps, straight));
+}

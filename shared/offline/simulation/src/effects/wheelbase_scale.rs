@@ -24,3 +24,10 @@ pub(super) const DEFINITION: Definition = Definition {
         plant.contact.wheelbase *= values[0];
     },
 };
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{Trial, steps, straight, tests};
+
+    tests!(Trial::of("wheelbase_scale", &[0.92], steps, straight));
+}
