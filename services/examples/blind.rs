@@ -1,15 +1,18 @@
 //! Draws cases on the proving ground, diagnoses them in this process and says for each what was put in and what was found:
 //! for whoever works on the diagnosis.
 //!
-//! `cargo run --release -p kerbside --example blind -- --cases 60 --seed 1 [--only N]`
+//! `cargo run --release -p kerbside --example blind -- --cases 60 --seed 1 [--only N] [--keep DIR] [--plant simulator] [--ideal]`
+//!
+//! `--ideal` takes away what a car in good order has of physics beyond the nominal vehicle: creep of the tyres, give and
+//! geometry of the linkage.
 
 use std::io::Write;
 use std::time::Instant;
 
 use kerbside::diagnose::Input;
-use kerbside::trial::folder;
+use kerbside::trial::{Simulated, folder};
 use kerbside_diagnosis::{Diagnosis, Settings, diagnose};
-use kerbside_proving_ground::cases::{Case, SecondVehicle, series};
+use kerbside_proving_ground::cases::{Build, Case, Drives, SecondVehicle, series};
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -21,16 +24,22 @@ fn main() -> Outcome<()> {
     };
     let (count, seed) = (number("--cases").unwrap_or(20), number("--seed").unwrap_or(1));
     let keep = words.iter().position(|word| word == "--keep").and_then(|at| words.get(at + 1));
+    let has = |name: &str| words.iter().any(|word| word == name);
+    let plant: &dyn Drives = if has("simulator") { &Simulated } else { &SecondVehicle };
     let all = series(seed, usize::try_from(count)?, |request| request);
     for (index, (seed, request)) in all.iter().enumerate() {
         if number("--only").is_some_and(|only| only != index as u64) {
             continue;
         }
-        let Some(case) = Case::of(*seed, request) else { continue };
+        let Some(mut case) = Case::of(*seed, request) else { continue };
+        if has("--ideal") {
+            let build = case.specification.build;
+            case.specification.build = ideal(build);
+        }
         let place = tempfile::tempdir()?;
         let home = keep.map_or_else(|| place.path().to_owned(), std::path::PathBuf::from);
         let home = home.join(format!("case{index:03}"));
-        folder::write(&home, &case, &SecondVehicle).map_err(|failure| format!("{failure:?}"))?;
+        folder::write(&home, &case, plant).map_err(|failure| format!("{failure:?}"))?;
         if keep.is_some() {
             std::fs::write(home.join("label.toml"), case.label().text())?;
         }
@@ -43,6 +52,20 @@ fn main() -> Outcome<()> {
         std::io::stdout().flush()?;
     }
     Ok(())
+}
+
+/// The same without any physics of tyres and linkage.
+fn ideal(build: Build) -> Build {
+    Build {
+        lateral_compliance: [0.0; 2],
+        longitudinal_compliance: 0.0,
+        rolling_resistance: 0.0,
+        ackermann: 1.0,
+        linkage: 0.0,
+        toe: 0.0,
+        gyro_latency: 0.0,
+        ..build
+    }
 }
 
 /// Kind, what was put in, and what the vehicle has.
