@@ -208,6 +208,12 @@ fn what_was_put_in_is_found_within_its_intervals_and_loads_again() {
     assert_eq!((&json["method"], &json["seed"]), (&"joint".into(), &Json::Null));
     assert_eq!(json["left_out"]["runs"].as_array().unwrap().len(), 3 * DRIVES.len());
     assert!(rms(&json, "after") < 0.25 * rms(&json, "before"), "{}", json["left_out"]);
+    let drift = &json["drift"]["medians"];
+    let percent = |side: &str| drift[side]["position_percent"].as_f64().unwrap();
+    assert!(percent("after") < 0.5 * percent("before"), "{drift}");
+    assert!(percent("after") < 1.5 * percent("floor") + 0.5, "{drift}");
+    assert_eq!(drift["position_reached"], true);
+    assert_eq!(json["drift"]["runs"].as_array().unwrap().len(), DRIVES.len());
     loads_again(&case, &json);
     drifts_less(&case, &json);
     let report = fs::read_to_string(json["report"].as_str().unwrap()).unwrap();

@@ -11,7 +11,9 @@ use kerbside::lockstep::{LineFault, Script};
 use kerbside::manoeuvre::End;
 use kerbside::park::judge::{Verdict, judge};
 use kerbside::park::{Job, ParkArgs, Run, job, simulated};
-use kerbside_messages::{AlterReason, Cause, EstimatorState, Mode, Nanos, Process};
+use kerbside_messages::{
+    AlterReason, Cause, EstimatorState, Mode, Nanos, Odometry, Process, ResetReason,
+};
 
 #[derive(Parser)]
 struct Arguments {
@@ -142,6 +144,28 @@ fn after_a_death_the_operator_completes_the_manoeuvre() {
 }
 
 #[test]
+fn a_restarted_estimator_goes_on_with_what_it_had_learnt_of_the_vehicle() {
+    let script = Script { kills: vec![(under_way(), Process::Estimator)], ..Script::default() };
+    let (run, _) = drive(&["garage", "--rearm"], 1, script);
+    let restored = |odometry: &Odometry| odometry.reset_reason == ResetReason::Restored.code();
+    let lives: Vec<_> = run
+        .trace
+        .odometry
+        .chunk_by(|one, next| {
+            one.header.epoch == next.header.epoch && restored(one) == restored(next)
+        })
+        .collect();
+    let before = lives[0].last().unwrap();
+    let after = lives.iter().find(|life| restored(&life[0])).unwrap()[0];
+    let (known, taken) = (&before.filter_state, &after.filter_state);
+    assert_ne!(known.parameters, [0.0; 9], "it had learnt something");
+    assert_eq!(taken.parameters, known.parameters);
+    assert_eq!(taken.basis, known.basis);
+    assert!(after.covariance[0] > before.covariance[0], "what rolled by is less certain");
+    assert!(after.covariance[0] < 1.9 * before.covariance[0], "but not twice the covariance");
+}
+
+#[test]
 fn the_death_of_planner_or_recorder_does_not_stop_the_car() {
     let at = under_way();
     for process in [Process::Planner, Process::Recorder] {
@@ -202,4 +226,26 @@ fn a_process_that_keeps_dying_is_given_up() {
     let kills = (0..40).map(|index| (at + index * SECOND, Process::Tracker)).collect();
     let (run, verdict) = drive(&["garage", "--rearm"], 1, Script { kills, ..Script::default() });
     assert_eq!(run.end, End::Stopped(Cause::GaveUp), "{}", verdict.cause);
+}
+
+#[test]
+fn effects_of_an_overlay_show_in_how_the_car_parks() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("model.toml");
+    let text = "[[effect]]\nid = \"steering_offset\"\noffset = 0.05\n\n\
+                [[effect]]\nid = \"radius_scale\"\nscale = 1.04\n";
+    std::fs::write(&file, text).unwrap();
+    let words = ["garage", "--effects", file.to_str().unwrap()];
+    let job = job_of(&words, 1);
+    assert!(job.command_line.contains("--effects") && job.configuration.len() == 4);
+    let (with, told) = drive(&words, 1, Script::default());
+    let (without, nominal) = drive(&["garage"], 1, Script::default());
+    let way = |run: &Run| run.trace.truth.last().unwrap().distance;
+    let believed = |verdict: &Verdict| {
+        let estimate = verdict.estimate_error.unwrap();
+        estimate.x.hypot(estimate.y)
+    };
+    // Wheels that are larger than described roll farther than the odometry believes.
+    assert!(way(&with) > 1.02 * way(&without), "{} {}", way(&with), way(&without));
+    assert!(believed(&told) > believed(&nominal) + 0.02, "{told:?} {nominal:?}");
 }

@@ -215,6 +215,46 @@ fn a_vehicle_with_one_wheel_and_nothing_else_is_refused_with_the_reason() {
 }
 
 #[test]
+fn fixes_teach_the_estimator_and_the_rest_of_the_drive_judges_it() {
+    let run = run_of("paper-1-6");
+    let plain = hash(&pure(&run, &[]));
+    let outcome = pure(&run, &["--fixes", "0.6", "--fix-rate", "10"]);
+    assert_eq!(hash(&outcome), plain, "the odometry that is compared is without fixes");
+    let fixes = &outcome.json["fixes"];
+    let given = fixes["given"].as_u64().unwrap();
+    assert!(given >= 15 && fixes["taken"].as_u64() == Some(given), "{fixes}");
+    let zero = &fixes["parameters"]["steering_zero"];
+    let number = |key: &str| zero[key].as_f64().unwrap();
+    assert!(number("deviation") < 0.9 * number("prior_deviation"), "{zero}");
+    assert!(number("low") < number("value") && number("value") < number("high"), "{zero}");
+    assert!(number("low") < 0.0 && 0.0 < number("high"), "the sensor of this car is true: {zero}");
+    for way in ["without", "with"] {
+        assert!(fixes["rest"][way]["position_percent"].is_number(), "{fixes}");
+    }
+    assert!(pure(&run, &[]).json["fixes"].is_null());
+}
+
+#[test]
+fn fixes_need_a_reference_with_noise_and_one_process() {
+    let (sandbox, folder) = (Sandbox::new(), tempfile::tempdir().unwrap());
+    let run = copy_of("paper-1-6", folder.path());
+    let from = "noise = { position = 0.002, yaw = 0.002 }";
+    edit(&folder.path().join("vehicle.toml"), from, "noise = { position = 0.0, yaw = 0.002 }");
+    let said = |more: &[&str]| {
+        let mut command = sandbox.kerbside();
+        command.args(["replay", text(&run)]).args(more);
+        let outcome = Verb::start(command).end();
+        (outcome.code, outcome.stderr)
+    };
+    let (code, words) = said(&["--pure", "--fixes", "0.5"]);
+    assert!(code == Some(65) && words.contains("reference.noise.position"), "{words}");
+    let (code, words) = said(&["--fixes", "0.5"]);
+    assert!(code == Some(2) && words.contains("--pure"), "{words}");
+    let (code, words) = said(&["--pure", "--fixes", "1.5"]);
+    assert!(code == Some(2) && words.contains("between 0 and 1"), "{words}");
+}
+
+#[test]
 fn broken_input_is_refused_by_file_and_line() {
     let (sandbox, folder) = (Sandbox::new(), tempfile::tempdir().unwrap());
     refused(&sandbox, &folder.path().join("nowhere"), &["nowhere: no such file or folder"]);

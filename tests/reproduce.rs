@@ -63,7 +63,8 @@ fn parking_of_the_stack_in_lockstep_stands_beside_row_9() {
     let rows = ["reproduce", "--trials", "2", "--rows", "9", "--json", "--out", out];
     let object = json(&kerbside(&rows, state.path()));
     let stack = object["stack"].as_array().unwrap();
-    assert_eq!(stack.len(), 2);
+    let scenes: Vec<_> = stack.iter().map(|line| line["scene"].as_str().unwrap()).collect();
+    assert_eq!(scenes, ["garage", "parallel", "garage-full-size", "parallel-full-size"]);
     assert!(stack.iter().all(|line| line["parked"] == line["of"]), "{stack:?}");
 }
 
@@ -91,6 +92,8 @@ fn what_cannot_be_asked_is_refused() {
     ] {
         assert_eq!(kerbside(&arguments, state.path()).status.code(), Some(2), "{arguments:?}");
     }
+    let nothing_to_write = kerbside(&["compare", "filters", "--out", "somewhere"], state.path());
+    assert_eq!(nothing_to_write.status.code(), Some(2));
     let missing = kerbside(&["compare", "filters", "/nowhere"], state.path());
     assert_eq!(missing.status.code(), Some(65));
 }

@@ -47,12 +47,20 @@ pub fn make(folder: &Path) -> Result<(), Failure> {
         .map_err(|error| cannot_write(folder, &error.into()))
 }
 
-/// Writes a file of results.
+/// Writes a file of results: whole, or not at all. What was there under that name stays until it is.
 ///
 /// # Errors
 /// [`Failure`] naming the file.
 pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    fs::write(path, text).map_err(|error| cannot_write(path, &error))
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(format!(".{}.part", std::process::id()));
+    let part = path.with_file_name(name);
+    let written = fs::write(&part, text).and_then(|()| fs::rename(&part, path));
+    written.map_err(|error| {
+        let _ = fs::remove_file(&part);
+        cannot_write(path, &error)
+    })
 }
 
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
@@ -71,4 +79,25 @@ pub fn terminal_width() -> Option<u16> {
 pub fn stamp() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |passed| passed.as_secs());
     format!("{seconds}-{}", std::process::id())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_whole_or_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("report.html");
+        write(&path, "one").unwrap();
+        write(&path, "two").unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "two");
+        // A folder cannot be replaced by a file: the last step of writing fails.
+        let taken = folder.path().join("taken");
+        fs::create_dir(&taken).unwrap();
+        let said = write(&taken, "three").unwrap_err().report.to_string();
+        assert!(said.contains("taken"), "{said}");
+        let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+        assert_eq!(left.len(), 2, "{left:?}");
+    }
 }

@@ -1,15 +1,14 @@
 //! What either method finds, in one form.
 
 use kerbside_calibration::{
-    COUNT, Calibrated, CalibrationError, ClosedForm, Derived, Finding, LeftOut, PARAMETERS,
-    Parameter, Parameters, Rejected, Run, RunResiduals, Settings, Square, SteeringCheck, calibrate,
+    COUNT, Calibrated, CalibrationError, ClosedForm, Derived, Finding, PARAMETERS, Parameter,
+    Parameters, Rejected, Run, RunResiduals, Settings, Square, SteeringCheck, Vector, calibrate,
     check_steering, closed_form, diagnose_runs, fold_of, information,
 };
 use kerbside_geometry::Vehicle;
 use kerbside_settings::CALIBRATED;
 
 use super::Method;
-use super::judge::judge;
 use crate::exit::{Exit, Failure};
 
 /// A parameter, and what was found of it; each in its unit.
@@ -47,6 +46,8 @@ pub struct Found {
     pub estimates: Vec<Estimate>,
     /// Of all parameters; none where the method gives none.
     pub covariance: Option<Square>,
+    /// Variances of all parameters from drive to drive, beyond the readings' noise; 0 where there is nothing beyond.
+    pub between: Vector,
     /// Runs that the parameters come from.
     pub runs: Vec<String>,
     /// Runs that were rejected.
@@ -114,6 +115,7 @@ fn joint(found: Calibrated, vehicle: &Vehicle) -> Found {
         parameters,
         estimates: found.estimates.iter().map(estimate).collect(),
         covariance: Some(found.covariance),
+        between: found.between,
         runs: found.residuals.iter().map(|run| run.run.clone()).collect(),
         missing: found.missing.iter().map(missing).collect(),
         rejected: found.rejected,
@@ -153,6 +155,7 @@ fn closed(runs: &[Run], vehicle: &Vehicle, settings: &Settings) -> Result<Found,
         parameters: form.parameters,
         estimates: closed_estimates(&form, vehicle, &kept),
         covariance: None,
+        between: Vector::zeros(),
         runs: used,
         rejected,
         findings,
@@ -172,7 +175,12 @@ fn closed_free(vehicle: &Vehicle, runs: &[Run]) -> [bool; COUNT] {
     PARAMETERS.map(|parameter| match parameter {
         Parameter::TrackFront => pair(0, vehicle.track_front) && steered,
         Parameter::TrackRear => pair(2, vehicle.track_rear),
-        Parameter::Wheelbase | Parameter::SteeringZero | Parameter::SteeringGain => false,
+        Parameter::Wheelbase
+        | Parameter::SteeringZero
+        | Parameter::SteeringGain
+        | Parameter::MarkerX
+        | Parameter::MarkerY
+        | Parameter::MarkerYaw => false,
         radius => has(radius.index()),
     })
 }
@@ -211,30 +219,36 @@ fn closed_missing(form: &ClosedForm, vehicle: &Vehicle, runs: &[Run]) -> Vec<Mis
     open.map(|parameter| Missing { parameter, manoeuvre: needs(parameter).to_owned() }).collect()
 }
 
-/// Every run of `fitted` judged by a fit of the others, in as many parts as `settings` say; empty where they are too few.
-pub fn folded(
+/// A part of the runs, and what a fit of the others found.
+pub struct Fold<'a> {
+    /// By the others.
+    pub found: Found,
+    /// The part.
+    pub out: Vec<&'a Run>,
+}
+
+/// Every run of `fitted` once in a part that is left out of a fit of the others, in as many parts as `settings` say;
+/// empty where they are too few.
+pub fn folds<'a>(
     method: Method,
-    fitted: &[&Run],
+    fitted: &[&'a Run],
     vehicle: &Vehicle,
     settings: &Settings,
-) -> Vec<LeftOut> {
-    let folds = settings.folds.min(fitted.len());
+) -> Vec<Fold<'a>> {
+    let count = settings.folds.min(fitted.len());
     let manoeuvres: Vec<String> = fitted.iter().map(|run| run.manoeuvre.clone()).collect();
-    let fold = fold_of(&manoeuvres, folds);
-    let nominal = Parameters::nominal(vehicle);
-    // The parts are judged here, by what would be written down.
+    let fold = fold_of(&manoeuvres, count);
+    // The parts are judged by what would be written down.
     let alone = Settings { folds: 0, ..*settings };
-    let mut table = Vec::new();
-    for part in 0..if folds < 2 { 0 } else { folds } {
+    let mut folds = Vec::new();
+    for part in 0..if count < 2 { 0 } else { count } {
         let rest = (0..fitted.len()).filter(|index| fold[*index] != part);
         let rest: Vec<Run> = rest.map(|index| fitted[index].clone()).collect();
         let Ok(found) = fit(method, &rest, vehicle, &alone) else { continue };
-        for index in (0..fitted.len()).filter(|index| fold[*index] == part) {
-            table.extend(judge(fitted[index], vehicle, [&nominal, &found.parameters], settings));
-        }
+        let out = (0..fitted.len()).filter(|index| fold[*index] == part);
+        folds.push(Fold { found, out: out.map(|index| fitted[index]).collect() });
     }
-    table.sort_by(|a, b| (&a.run, a.source).cmp(&(&b.run, b.source)));
-    table
+    folds
 }
 
 /// What forbids the run called `name`, with the evidence.
@@ -250,6 +264,9 @@ fn refusal(
     vehicle: &Vehicle,
     settings: &Settings,
 ) -> Failure {
+    if let CalibrationError::Unusable { .. } = error {
+        return Failure::new(Exit::Data, error.to_string());
+    }
     let findings = diagnose_runs(runs, vehicle, &settings.noise);
     let nominal = Parameters::nominal(vehicle);
     let why = |run: &Run| {

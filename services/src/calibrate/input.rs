@@ -7,6 +7,7 @@ use kerbside_geometry::{Vehicle, WHEELS, Wheel};
 use kerbside_recordings::run_folder;
 use kerbside_settings::{VehicleFile, parse_vehicle};
 
+use super::drift::Recorded;
 use crate::configuration::{self, refused_run as refused};
 use crate::exit::{Exit, Failure};
 
@@ -21,6 +22,8 @@ pub struct Case {
     pub file: VehicleFile,
     /// The runs by name.
     pub runs: Vec<Run>,
+    /// Where they were recorded.
+    pub recorded: Recorded,
     /// What a person should know of the input, a sentence each.
     pub notices: Vec<String>,
 }
@@ -45,10 +48,17 @@ impl Case {
             .map_err(|error| Failure::new(Exit::Data, format!("{origin}: {error}")))?;
         let parsed = parse_vehicle(&origin, &text)?;
         configuration::warn(&parsed.warnings);
-        let mut case =
-            Self { origin, text, file: parsed.value, runs: Vec::new(), notices: Vec::new() };
+        let mut case = Self {
+            origin,
+            text,
+            file: parsed.value,
+            runs: Vec::new(),
+            recorded: Recorded::new(),
+            notices: Vec::new(),
+        };
         for folder in folders {
             let recorded = run_folder::Run::read(&folder).map_err(refused)?;
+            case.recorded.insert(recorded.about.info.name.clone(), (folder.clone(), None));
             case.take(&recorded);
         }
         case.notices.sort();
@@ -130,7 +140,8 @@ fn rotations(
         let rows = rows.filter(|row| read(row.mask));
         let (t, speeds): (Vec<f64>, Vec<f64>) = rows.map(|row| (row.t, row.speeds[index])).unzip();
         let there = !t.is_empty() && exists(vehicle, wheel);
-        there.then(|| Series::from_speeds(t, &speeds, vehicle.radius[index]))
+        let radius = vehicle.speed_radius[index].unwrap_or(vehicle.radius[index]);
+        there.then(|| Series::from_speeds(t, &speeds, radius))
     })
 }
 

@@ -20,7 +20,7 @@ pub fn judge(
 ) -> Vec<LeftOut> {
     let error = |parameters: &Parameters, source: Source| {
         let path = dead_reckon(run, vehicle, parameters, settings, source).ok()??;
-        end_error(run, vehicle, &path)
+        end_error(run, &parameters.marker(), &path)
     };
     let (floor_position, floor_yaw) = floor(run, settings);
     let row = |source: Source| {
@@ -45,7 +45,7 @@ fn last_reading(run: &Run) -> Option<ReferencePose> {
 }
 
 /// How far `path` ends from what `run` knows of its end, in the frame of the start.
-fn end_error(run: &Run, vehicle: &Vehicle, path: &Path) -> Option<EndError> {
+fn end_error(run: &Run, marker: &Pose, path: &Path) -> Option<EndError> {
     let start = path.poses.first()?.1;
     let end = path.poses.last()?.1;
     let seen_from_start = |dx: f64, dy: f64, yaw: Option<f64>| {
@@ -53,8 +53,7 @@ fn end_error(run: &Run, vehicle: &Vehicle, path: &Path) -> Option<EndError> {
         EndError { x: cos * dx + sin * dy, y: cos * dy - sin * dx, yaw }
     };
     if let Some(reading) = last_reading(run) {
-        let marker = vehicle.reference.map_or(Pose::default(), |reference| reference.marker);
-        let marker = pose_at(path, reading.t)?.compose(&marker);
+        let marker = pose_at(path, reading.t)?.compose(marker);
         let yaw = reading.yaw.map(|yaw| angle::wrap(marker.yaw - yaw));
         return Some(seen_from_start(marker.x - reading.x, marker.y - reading.y, yaw));
     }

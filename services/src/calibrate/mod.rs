@@ -1,6 +1,7 @@
 //! `calibrate`: the systematic errors of a vehicle's odometry, identified from its recorded runs, and judged on runs
 //! that the fit has not seen.
 
+mod drift;
 mod fit;
 mod input;
 mod judge;
@@ -18,9 +19,11 @@ use kerbside_calibration::{LeftOut, Parameters, Rejected, Run, Settings, diagnos
 use crate::exit::{Exit, Failure};
 use crate::figures::Figure;
 use crate::output as folders;
+use drift::RunDrift;
 use fit::Found;
 use input::Case;
 use judge::Rms;
+use output::Provenance;
 
 /// What `calibrate` is asked.
 #[derive(Clone, Debug, clap::Args)]
@@ -42,6 +45,15 @@ pub struct CalibrateArgs {
     /// Identify the steering sensor's gain, too: it takes circles of at least two radii.
     #[arg(long)]
     pub free_gain: bool,
+    /// Identify the place of the reference's marker on the vehicle, too: it takes curves to both sides.
+    #[arg(long)]
+    pub free_marker: bool,
+    /// The reference's stamps may be late or early by about so much, another time in every run.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_time, default_value_t = 0.0)]
+    pub lag: f64,
+    /// And by so much more after a second, growing with the square root of time: a clock that wanders.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_time, default_value_t = 0.0, requires = "lag")]
+    pub wander: f64,
     /// Folder for vehicle.toml and report; a new one in the state folder where not given.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -82,6 +94,9 @@ pub struct Calibration {
     left_out: Vec<LeftOut>,
     /// The same of runs that the fit rejected though they can be used: they do not count, and are shown.
     outliers: Vec<LeftOut>,
+    /// Drift of the runs left out, and of the outliers, by the estimator's odometry.
+    drifts: Vec<RunDrift>,
+    outlier_drifts: Vec<RunDrift>,
     /// Calibrated vehicle.toml; none where nothing was identified.
     vehicle: Option<PathBuf>,
     report: PathBuf,
@@ -114,22 +129,40 @@ fn calibrated(args: &CalibrateArgs, progress: &ProgressBar) -> Result<Calibratio
     let (out, fitted): (Vec<&Run>, Vec<&Run>) = case.runs.iter().partition(is_out);
     let fitted: Vec<Run> = fitted.into_iter().cloned().collect();
     let mut settings = Settings::of(vehicle);
-    settings.free_gain = args.free_gain;
+    (settings.free_gain, settings.free_marker) = (args.free_gain, args.free_marker);
+    (settings.noise.reference_lag, settings.noise.reference_wander) = (args.lag, args.wander);
     let folds = std::mem::take(&mut settings.folds);
     progress.set_message(format!("fitting {} runs", fitted.len()));
     let mut found = fit::fit(args.method, &fitted, vehicle, &settings)?;
     progress.set_message("judging");
-    let left_out = match named {
-        Some(_) => judged(&out, &case, &settings, &mut found),
-        None => {
-            settings.folds = folds;
-            let used = |run: &&Run| found.runs.contains(&run.name);
-            let used: Vec<&Run> = fitted.iter().filter(used).collect();
-            fit::folded(args.method, &used, vehicle, &settings)
-        }
-    };
-    let outliers = outliers(&fitted, &case, &settings, &found);
     let folder = folders::folder(args.out.as_deref(), "calibrate")?;
+    let provenance = Provenance { method: args.method, left_out: named.as_deref() };
+    let drifts_of = |found: &Found, runs: &[&str], name: &str| {
+        drift::drifts(&case, found, &provenance, runs, &folder.join("judged").join(name))
+    };
+    let (mut left_out, mut drifts) = (Vec::new(), Vec::new());
+    if named.is_some() {
+        left_out = judged(&out, &case, &settings, &mut found);
+        drifts = drifts_of(&found, &names_of(&left_out), "left-out")?;
+    } else {
+        settings.folds = folds;
+        let used = |run: &&Run| found.runs.contains(&run.name);
+        let used: Vec<&Run> = fitted.iter().filter(used).collect();
+        let nominal = Parameters::nominal(vehicle);
+        for (number, fold) in fit::folds(args.method, &used, vehicle, &settings).iter().enumerate()
+        {
+            let pair = [&nominal, &fold.found.parameters];
+            left_out.extend(
+                fold.out.iter().flat_map(|run| judge::judge(run, vehicle, pair, &settings)),
+            );
+            let names: Vec<&str> = fold.out.iter().map(|run| run.name.as_str()).collect();
+            drifts.extend(drifts_of(&fold.found, &names, &format!("part-{}", number + 1))?);
+        }
+        left_out.sort_by(|a, b| (&a.run, a.source).cmp(&(&b.run, b.source)));
+        drifts.sort_by(|a, b| a.run.cmp(&b.run));
+    }
+    let outliers = outliers(&fitted, &case, &settings, &found);
+    let outlier_drifts = drifts_of(&found, &names_of(&outliers), "outliers")?;
     let mut calibration = Calibration {
         method: args.method,
         settings,
@@ -137,6 +170,8 @@ fn calibrated(args: &CalibrateArgs, progress: &ProgressBar) -> Result<Calibratio
         named,
         left_out,
         outliers,
+        drifts,
+        outlier_drifts,
         vehicle: None,
         report: folder.join("report.html"),
         command_line: command_line(args),
@@ -150,6 +185,22 @@ fn calibrated(args: &CalibrateArgs, progress: &ProgressBar) -> Result<Calibratio
     Ok(calibration)
 }
 
+/// The runs of a table, each once.
+fn names_of(table: &[LeftOut]) -> Vec<&str> {
+    let mut names: Vec<&str> = table.iter().map(|row| row.run.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+/// A time, not negative and no longer than ten seconds.
+fn parse_time(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(time) if (0.0..=10.0).contains(&time) => Ok(time),
+        _ => Err(format!("found {text:?}, allowed is a time from 0 to 10 s")),
+    }
+}
+
 /// Cuts each run in two; the names of the ends.
 fn split_runs(case: &mut Case, share: f64) -> Vec<String> {
     let runs = std::mem::take(&mut case.runs);
@@ -158,6 +209,12 @@ fn split_runs(case: &mut Case, share: f64) -> Vec<String> {
         match split::split(&run, share) {
             Some([begin, end]) => {
                 ends.push(end.name.clone());
+                if let Some((folder, _)) = case.recorded.remove(&run.name) {
+                    for part in [&begin, &end] {
+                        let recorded = (folder.clone(), part.span());
+                        case.recorded.insert(part.name.clone(), recorded);
+                    }
+                }
                 case.runs.extend([begin, end]);
             }
             None => case.runs.push(run),
@@ -233,6 +290,9 @@ fn command_line(args: &CalibrateArgs) -> String {
     );
     words.extend(args.split.map(|share| format!("--split {share}")));
     words.extend(args.free_gain.then(|| "--free-gain".to_owned()));
+    words.extend(args.free_marker.then(|| "--free-marker".to_owned()));
+    words.extend((args.lag > 0.0).then(|| format!("--lag {}", args.lag)));
+    words.extend((args.wander > 0.0).then(|| format!("--wander {}", args.wander)));
     words.join(" ")
 }
 

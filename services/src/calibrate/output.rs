@@ -1,12 +1,12 @@
 //! The calibrated vehicle.toml: the input's own text with other values, and where they come from.
 
 use kerbside_calibration::Parameter;
-use kerbside_geometry::Vehicle;
+use kerbside_geometry::{Vehicle, WHEELS};
 use kerbside_settings::parse_vehicle;
 use toml_edit::{Array, DocumentMut, Formatted, InlineTable, Item, Table, Value};
 
-use super::Calibration;
-use super::fit::{Estimate, key};
+use super::fit::{Estimate, Found, key};
+use super::{Calibration, Case, Method};
 use crate::exit::{Exit, Failure};
 use crate::machine;
 
@@ -15,19 +15,38 @@ use crate::machine;
 /// # Errors
 /// [`Failure`] where the input's text is not TOML, or what is written would not be read again.
 pub fn vehicle_text(calibration: &Calibration) -> Result<String, Failure> {
-    let case = &calibration.case;
+    let provenance =
+        Provenance { method: calibration.method, left_out: calibration.judged_by_name() };
+    text_of(&calibration.case, &calibration.found, &provenance)
+}
+
+/// Where the values come from, beside what was found.
+#[derive(Clone, Copy, Debug)]
+pub struct Provenance<'a> {
+    /// How they were identified.
+    pub method: Method,
+    /// Runs left out by name.
+    pub left_out: Option<&'a [String]>,
+}
+
+/// The text of the file of `case`'s vehicle with what was `found`.
+///
+/// # Errors
+/// See [`vehicle_text`].
+pub fn text_of(case: &Case, found: &Found, provenance: &Provenance<'_>) -> Result<String, Failure> {
     let mut document: DocumentMut = case
         .text
         .parse()
         .map_err(|error| Failure::new(Exit::Configuration, format!("{}: {error}", case.origin)))?;
     let root = document.as_table_mut();
-    for estimate in identified(calibration) {
+    speed_radii(root, case.vehicle(), found);
+    for estimate in identified(found) {
         put(root, &path_of(estimate.parameter), number(rounded(estimate)));
     }
-    right_wheels(root, calibration);
-    uncertainty(root, calibration);
+    right_wheels(root, case.vehicle(), found);
+    uncertainty(root, found);
     root.remove("calibration");
-    root.insert("calibration", Item::Table(provenance(calibration)));
+    root.insert("calibration", Item::Table(calibration(found, provenance)));
     let text = document.to_string();
     parse_vehicle("the calibrated vehicle.toml", &text)
         .map_err(|error| Failure::internal(format!("what was found is no vehicle: {error}")))?;
@@ -35,8 +54,8 @@ pub fn vehicle_text(calibration: &Calibration) -> Result<String, Failure> {
 }
 
 /// What is written down.
-fn identified(calibration: &Calibration) -> impl Iterator<Item = &Estimate> {
-    calibration.found.estimates.iter().filter(|found| found.identified)
+fn identified(found: &Found) -> impl Iterator<Item = &Estimate> {
+    found.estimates.iter().filter(|found| found.identified)
 }
 
 fn path_of(parameter: Parameter) -> Vec<&'static str> {
@@ -90,28 +109,44 @@ fn significant(value: f64, step: f64) -> f64 {
     format!("{value:.decimals$}").parse().unwrap_or(value)
 }
 
+/// A vehicle that reports speeds goes on computing them with the radii that it had.
+fn speed_radii(root: &mut Table, vehicle: &Vehicle, found: &Found) {
+    if vehicle.encoders.is_some() {
+        return;
+    }
+    for estimate in identified(found) {
+        let Some(wheel) = WHEELS.into_iter().find(|w| Parameter::radius(*w) == estimate.parameter)
+        else {
+            continue;
+        };
+        let index = wheel.index();
+        let used = vehicle.speed_radius[index].unwrap_or(vehicle.radius[index]);
+        put(root, &["speed_radius", wheel.name()], number(used));
+    }
+}
+
 /// Without a track there is one wheel, and a radius of its twin that was stated beside it is no other.
-fn right_wheels(root: &mut Table, calibration: &Calibration) {
-    let vehicle: &Vehicle = calibration.case.vehicle();
+fn right_wheels(root: &mut Table, vehicle: &Vehicle, found: &Found) {
     let twins = [
         (vehicle.track_front, Parameter::RadiusFrontLeft, "fr"),
         (vehicle.track_rear, Parameter::RadiusRearLeft, "rr"),
     ];
     for (track, left, right) in twins {
-        let found = identified(calibration).find(|found| found.parameter == left);
+        let of_left = identified(found).find(|found| found.parameter == left);
         let stated =
             root.get("radius").and_then(Item::as_table_like).is_some_and(|t| t.contains_key(right));
-        if let (Some(found), true) = (found, track == 0.0 && stated) {
-            put(root, &["radius", right], number(rounded(found)));
+        if let (Some(of_left), true) = (of_left, track == 0.0 && stated) {
+            put(root, &["radius", right], number(rounded(of_left)));
         }
     }
 }
 
 /// `[uncertainty]` and `[uncertainty.effect]` from the covariance.
-fn uncertainty(root: &mut Table, calibration: &Calibration) {
+fn uncertainty(root: &mut Table, found: &Found) {
     let mut radius = 0.0_f64;
-    for estimate in identified(calibration) {
+    for estimate in identified(found) {
         let Some((deviation, _)) = estimate.spread else { continue };
+        let deviation = deviation.hypot(found.between[estimate.parameter.index()].sqrt());
         let stated = number(significant(deviation, deviation * 1e-2));
         match estimate.parameter {
             Parameter::TrackFront => put(root, &["uncertainty", "track_front"], stated),
@@ -123,6 +158,10 @@ fn uncertainty(root: &mut Table, calibration: &Calibration) {
             Parameter::SteeringGain => {
                 put(root, &["uncertainty", "effect", "steering_sensor_gain", "gain"], stated);
             }
+            Parameter::MarkerX | Parameter::MarkerY | Parameter::MarkerYaw => {
+                let name = estimate.parameter.name().trim_start_matches("marker.");
+                put(root, &["uncertainty", "effect", "reference_marker", name], stated);
+            }
             // The file has one figure for all wheels: that of the least known.
             _ => radius = radius.max(deviation),
         }
@@ -133,25 +172,27 @@ fn uncertainty(root: &mut Table, calibration: &Calibration) {
 }
 
 /// The table `[calibration]`.
-fn provenance(calibration: &Calibration) -> Table {
-    let found = &calibration.found;
+fn calibration(found: &Found, provenance: &Provenance<'_>) -> Table {
     let mut table = Table::new();
     table.decor_mut().set_prefix("\n# Written by `kerbside calibrate`.\n");
     let mut say = |name: &str, value: Value| table.insert(name, Item::Value(value));
-    say("method", calibration.method.name().into());
+    say("method", provenance.method.name().into());
     say("version", env!("CARGO_PKG_VERSION").into());
     say("date", machine::date().into());
     say("runs", texts(found.runs.iter().map(String::as_str)));
-    if let Some(judged) = calibration.judged_by_name() {
+    if let Some(judged) = provenance.left_out {
         say("left_out", texts(judged.iter().map(String::as_str)));
     }
-    let parameters = identified(calibration).map(|found| found.parameter);
+    let parameters = identified(found).map(|found| found.parameter);
     let parameters: Vec<Parameter> = parameters.collect();
     say("parameters", texts(parameters.iter().map(|parameter| key(*parameter))));
-    if let Some(rows) = covariance(calibration, &parameters) {
+    if let Some(rows) = covariance(found, &parameters) {
         say("covariance", rows);
     }
-    table.insert("residuals", Item::Table(residuals(calibration)));
+    if let Some(allowance) = allowance(found, &parameters) {
+        table.insert("allowance", Item::Value(allowance));
+    }
+    table.insert("residuals", Item::Table(residuals(found)));
     let mut rejected = Table::new();
     for run in &found.rejected {
         rejected.insert(&run.run, Item::Value(run.why.as_str().into()));
@@ -172,8 +213,8 @@ fn scientific(value: f64) -> Value {
 }
 
 /// The parameters' rows and columns, a row a line.
-fn covariance(calibration: &Calibration, parameters: &[Parameter]) -> Option<Value> {
-    let matrix = calibration.found.covariance.as_ref()?;
+fn covariance(found: &Found, parameters: &[Parameter]) -> Option<Value> {
+    let matrix = found.covariance.as_ref()?;
     let mut rows = Array::new();
     for one in parameters {
         let entry = |other: &Parameter| {
@@ -189,16 +230,26 @@ fn covariance(calibration: &Calibration, parameters: &[Parameter]) -> Option<Val
     Some(Value::Array(rows))
 }
 
+/// Standard deviations of the parameters from drive to drive; none where there is nothing beyond the noise.
+fn allowance(found: &Found, parameters: &[Parameter]) -> Option<Value> {
+    let variances = parameters.iter().map(|parameter| found.between[parameter.index()]);
+    let deviations: Vec<f64> = variances.map(f64::sqrt).collect();
+    let any = deviations.iter().any(|deviation| *deviation > 0.0);
+    any.then(|| Value::Array(deviations.into_iter().map(scientific).collect()))
+}
+
 /// Factor on the variances; root mean squares per run in standard deviations, as believed: 1.
-fn residuals(calibration: &Calibration) -> Table {
+fn residuals(found: &Found) -> Table {
     let (mut table, mut runs) = (Table::new(), Table::new());
-    let found = &calibration.found;
     table.insert("inflation", Item::Value(number(significant(found.inflation, 1e-3))));
     for run in &found.residuals {
         let mut of_run = InlineTable::new();
         of_run.insert("reference", number(significant(run.truth, 1e-2)));
         if run.comparison_count > 0 {
             of_run.insert("axles", number(significant(run.comparison, 1e-2)));
+        }
+        if let Some(lag) = run.lag {
+            of_run.insert("lag", number(significant(lag, 1e-3)));
         }
         runs.insert(&run.run, Item::Value(of_run.into()));
     }

@@ -4,6 +4,7 @@ use kerbside_calibration::{EndError, Finding, LeftOut, Parameter, Source};
 use kerbside_geometry::angle;
 use serde_json::{Map, Value, json};
 
+use super::drift::{Drifted, Medians, RunDrift};
 use super::fit::{Estimate, key};
 use super::judge::{Rms, SOURCES};
 use super::{CalibrateArgs, Calibration};
@@ -44,7 +45,7 @@ fn as_json(calibration: &Calibration) -> Value {
         .map(|d| (d.name.to_owned(), json!({ "value": d.value, "deviation": d.deviation })))
         .collect();
     let residuals = found.residuals.iter().map(|run| {
-        json!({ "run": run.run, "travel_m": run.travel, "reference": run.truth, "axles": run.comparison })
+        json!({ "run": run.run, "travel_m": run.travel, "reference": run.truth, "axles": run.comparison, "lag_s": run.lag })
     });
     let figures: Vec<Value> = calibration.figures().iter().map(Figure::as_json).collect();
     json!({
@@ -59,8 +60,10 @@ fn as_json(calibration: &Calibration) -> Value {
         "parameters": parameters,
         "covariance": covariance_as_json(calibration),
         "inflation": found.inflation,
+        "allowance": allowance_as_json(calibration),
         "derived": derived,
         "left_out": left_out_as_json(calibration),
+        "drift": drift_as_json(calibration),
         "residuals": residuals.collect::<Vec<_>>(),
         "rejected": rejected.collect::<Vec<_>>(),
         "missing": missing.collect::<Vec<_>>(),
@@ -83,6 +86,14 @@ fn covariance_as_json(calibration: &Calibration) -> Value {
     let rows: Vec<Vec<f64>> = parameters.iter().map(row).collect();
     let names: Vec<&str> = parameters.iter().map(|parameter| key(*parameter)).collect();
     json!({ "parameters": names, "rows": rows })
+}
+
+/// Standard deviations from drive to drive of the parameters that were identified, each in its unit.
+fn allowance_as_json(calibration: &Calibration) -> Value {
+    let found = &calibration.found;
+    let identified = found.estimates.iter().filter(|estimate| estimate.identified);
+    let of = |estimate: &Estimate| found.between[estimate.parameter.index()].sqrt();
+    identified.map(|e| (key(e.parameter).to_owned(), json!(of(e)))).collect()
 }
 
 fn parameter_as_json(estimate: &Estimate) -> Value {
@@ -117,6 +128,29 @@ fn left_out_as_json(calibration: &Calibration) -> Value {
         "after": overall.as_ref().map(|rms| side(rms, 1)),
         "sources": by_source,
         "runs": runs.collect::<Vec<_>>(),
+    })
+}
+
+fn drift_as_json(calibration: &Calibration) -> Value {
+    let of = |drift: &Drifted| json!({ "position_percent": drift.percent, "heading_rad_per_m": drift.heading });
+    let row = |run: &RunDrift, counts: bool| {
+        json!({
+            "run": run.run, "counts": counts, "window_m": run.window,
+            "before": of(&run.before), "after": of(&run.after), "floor": of(&run.floor),
+        })
+    };
+    let counting = calibration.drifts.iter().map(|run| row(run, true));
+    let outliers = calibration.outlier_drifts.iter().map(|run| row(run, false));
+    let medians = Medians::of(&calibration.drifts).map(|medians| {
+        json!({
+            "runs": medians.runs, "before": of(&medians.before), "after": of(&medians.after),
+            "floor": of(&medians.floor), "position_reached": medians.position_reached(),
+            "heading_reached": medians.heading_reached(),
+        })
+    });
+    json!({
+        "basis": calibration.basis(), "medians": medians,
+        "runs": counting.chain(outliers).collect::<Vec<_>>(),
     })
 }
 
@@ -160,6 +194,7 @@ fn print(calibration: &Calibration) {
     }
     print_parameters(calibration);
     print_left_out(calibration);
+    print_drift(calibration);
     for missing in &found.missing {
         println!("missing    {}: {}", key(missing.parameter), missing.manoeuvre);
     }
@@ -194,7 +229,7 @@ fn print_parameters(calibration: &Calibration) {
             estimate.parameter.unit().to_owned(),
             format!("{:.decimals$}", estimate.nominal),
             format!("{:.decimals$}{half}", estimate.value),
-            if estimate.identified { "yes" } else { "no, kept" }.to_owned(),
+            if estimate.identified { "yes" } else { "no, held" }.to_owned(),
         ]);
     }
     println!("{table}");
@@ -237,6 +272,37 @@ fn print_left_out(calibration: &Calibration) {
     if !calibration.outliers.is_empty() {
         println!("* rejected by the fit: it does not count");
     }
+}
+
+fn print_drift(calibration: &Calibration) {
+    let Some(medians) = Medians::of(&calibration.drifts) else { return };
+    println!(
+        "drift of the estimator's odometry, before and after, and by the reference's noise alone"
+    );
+    let header = ["run", "before %", "after %", "floor %", "before", "after rad/m", "floor"];
+    let mut shown = tables::figures(&header, &[1, 2, 3, 4, 5, 6]);
+    let mut add = |name: &str, [before, after, floor]: [&Drifted; 3]| {
+        let all = [before, after, floor];
+        let percent = all.map(|drift| format!("{:.2}", drift.percent));
+        let heading = all.map(|drift| format!("{:.5}", drift.heading));
+        shown.add_row(core::iter::once(name.to_owned()).chain(percent).chain(heading));
+    };
+    let row = |run: &RunDrift| [run.before, run.after, run.floor];
+    for run in &calibration.drifts {
+        add(&run.run, row(run).each_ref());
+    }
+    for run in &calibration.outlier_drifts {
+        add(&format!("{} *", run.run), row(run).each_ref());
+    }
+    let name = format!("median of {}", medians.runs);
+    add(&name, [&medians.before, &medians.after, &medians.floor]);
+    println!("{shown}");
+    let words = |reached| if reached { "reached" } else { "not reached" };
+    println!(
+        "half of before, or 1.5 times the floor: position {}, heading {}",
+        words(medians.position_reached()),
+        words(medians.heading_reached())
+    );
 }
 
 fn error_cells(

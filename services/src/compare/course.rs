@@ -77,7 +77,7 @@ fn print(out: &Reproduction) {
     }
     for figure in out.figures.iter().filter(|figure| out.verdict(figure) != Verdict::Reached) {
         let word = if out.verdict(figure) == Verdict::Open { "open" } else { "missed" };
-        println!("{word}: {}: {}", figure.name, short(figure.ours));
+        println!("{word}: {}\n        {}", figure.name, short(figure.ours));
     }
     println!("{} trials per case, seed {}", out.asked.trials, out.asked.seed);
 }

@@ -29,13 +29,13 @@ pub struct FiltersArgs {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Vehicle, in place of the runs' own: a file, or the name of a shipped one.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "paths")]
     pub vehicle: Option<String>,
     /// Configuration: a stack's file, or a folder like config/.
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "PATH", requires = "paths")]
     pub config: Option<PathBuf>,
     /// Folder for the runs' vehicle files; a new one in the state folder where not given.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", requires = "paths")]
     pub out: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]

@@ -21,6 +21,8 @@ pub(super) fn run(args: &FiltersArgs) -> Result<Exit, Failure> {
             path: path.clone(),
             speed: None,
             pure: true,
+            fixes: None,
+            fix_rate: 1.0,
             vehicle: args.vehicle.clone(),
             config: args.config.clone(),
             instance: None,
@@ -55,7 +57,7 @@ fn as_json(all: &[Filtered]) -> Value {
             json!({ "filter": name(drift.filter), "drift": figures })
         });
         json!({
-            "input": one.input, "name": one.name, "distance_m": one.distance, "why": one.why,
+            "input": one.input, "name": one.name, "distance_m": one.distance, "why": one.why, "notes": one.notes,
             "filters": filters.collect::<Vec<_>>(),
         })
     });
@@ -84,10 +86,10 @@ fn print(all: &[Filtered]) {
         table.add_row(first.into_iter().chain(cells));
     }
     println!("{table}");
-    println!(
-        "position drift [% of the distance], median over windows; position error at the end [m]"
-    );
+    println!("position drift [% of the distance], median over windows;");
+    println!("position error at the end [m]");
     for one in all {
         one.why.iter().for_each(|why| println!("{}: no drift: {why}", one.name));
+        one.notes.iter().for_each(|note| println!("{}: {note}", one.name));
     }
 }

@@ -47,7 +47,7 @@ fn page(diagnosed: &Diagnosed) -> String {
     say("where", &place(found));
     for (index, rival) in found.ranking.iter().take(RIVALS).enumerate() {
         let name = if index == 0 { "which" } else { "" };
-        say(name, &format!("{:.2}  {}", rival.probability, rival.name));
+        say(name, &format!("{:6}  {}", format::probability(rival.probability), rival.name));
     }
     for effect in &found.effects {
         say("size", &sizes(effect));

@@ -40,7 +40,11 @@ pub fn run(job: &Job, progress: &Progress) -> Result<Run, Failure> {
     let stop = stop_flag()?;
     let start = Start::draw(&job.scenario, job.seed);
     let pose = format_pose(&start.truth);
-    let vehicle = ["--start", &pose, "--seed", &job.seed.to_string()].map(OsString::from);
+    let mut vehicle =
+        ["--start", &pose, "--seed", &job.seed.to_string()].map(OsString::from).to_vec();
+    if let Some(effects) = &job.effects {
+        vehicle.extend(["--effects".into(), effects.into()]);
+    }
     let mut stack = Children::start(&job.service, Some(&vehicle))?;
     let session = stack.join(&stop)?;
     let mut desk = Desk::open(&session, job)?;

@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 
 use kerbside_messages::{Nanos, Plan, Process, TrajectoryPoint};
 use kerbside_runtime::Instance;
-use kerbside_settings::Scenario;
+use kerbside_settings::{Scenario, load_overlay};
+use kerbside_simulation::Overlay;
 
 use crate::exit::{Exit, Failure};
 use crate::lockstep::Script;
@@ -44,6 +45,9 @@ pub struct ParkArgs {
     /// Vehicle, in place of the scenario's: a file, or the name of a shipped one.
     #[arg(long, value_name = "FILE")]
     pub vehicle: Option<String>,
+    /// Overlay: effects by which the simulated vehicle differs from its description.
+    #[arg(long, value_name = "FILE")]
+    pub effects: Option<PathBuf>,
     /// Configuration: a stack's file, or a folder like config/.
     #[arg(long, value_name = "PATH")]
     pub config: Option<PathBuf>,
@@ -75,6 +79,10 @@ pub struct Job {
     pub seed: u64,
     /// Arm again after a fault.
     pub rearm: bool,
+    /// What the simulated vehicle differs by from its description.
+    pub overlay: Overlay,
+    /// The file that says so; none where it is as described.
+    pub effects: Option<PathBuf>,
     /// In one thread.
     pub lockstep: bool,
     /// Where to record; none in lockstep.
@@ -185,6 +193,7 @@ pub fn run_live(job: &Job) -> Result<Run, Failure> {
 pub fn job(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Job, Failure> {
     let parking =
         configuration::parking(args.config.as_deref(), &args.scenario, args.vehicle.as_deref())?;
+    let overlay = args.effects.as_deref().map(load_overlay).transpose()?.unwrap_or_default();
     let name = args.instance.clone().unwrap_or_else(|| Instance::fresh_name("park"));
     let recording = (!args.lockstep && parking.stack.value.recorder.enabled)
         .then(|| live::recording_in(folder));
@@ -205,14 +214,19 @@ pub fn job(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Job, Failure> {
         scenario: parking.scenario.value,
         seed,
         rearm: args.rearm,
+        overlay,
+        effects: args.effects.clone(),
         lockstep: args.lockstep,
         recording,
         command_line: command_line(args, seed),
-        configuration: vec![
+        configuration: [
             parking.scenario.file,
             parking.stack.file,
             parking.stack.value.vehicle_file,
-        ],
+        ]
+        .into_iter()
+        .chain(args.effects.as_ref().map(|effects| effects.display().to_string()))
+        .collect(),
     })
 }
 
@@ -222,6 +236,7 @@ fn command_line(args: &ParkArgs, seed: u64) -> String {
     words.extend(args.lockstep.then(|| "--lockstep".to_owned()));
     words.extend(args.rearm.then(|| "--rearm".to_owned()));
     words.extend(args.vehicle.as_ref().map(|vehicle| format!("--vehicle {vehicle}")));
+    words.extend(args.effects.as_ref().map(|effects| format!("--effects {}", effects.display())));
     words.extend(args.config.as_ref().map(|config| format!("--config {}", config.display())));
     words.join(" ")
 }

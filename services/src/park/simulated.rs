@@ -1,6 +1,7 @@
 //! A run in lockstep.
 
 use kerbside_messages::{Nanos, Verb, nanos};
+use kerbside_simulation::Effects;
 
 use super::scene::Start;
 use super::trace::Trace;
@@ -23,6 +24,7 @@ pub fn run(job: &Job, script: Script) -> Result<Run, Failure> {
     let start = Start::draw(scenario, job.seed);
     let making = Making {
         vehicle: job.service.vehicle.clone(),
+        effects: Effects::from(&job.overlay),
         start: start.truth,
         seed: job.seed,
         boot: 1,

@@ -1,6 +1,6 @@
 //! Ingest and estimator in one thread, with the checks between them that shared memory would make.
 
-use kerbside_messages::{Admission, Odometry, Raw, Refusal, Refusals, Travel};
+use kerbside_messages::{Admission, Fix, Odometry, Raw, Refusal, Refusals, Travel};
 use kerbside_odometry::{Estimator, EstimatorInputs, Ingest};
 
 use super::order::Order;
@@ -48,6 +48,11 @@ impl Chain {
 
     /// The odometry that a reading leads to; none where it is refused.
     pub fn step(&mut self, raw: &Raw) -> Option<&Odometry> {
+        self.step_with(raw, None)
+    }
+
+    /// The same where a fix came before the reading.
+    pub fn step_with(&mut self, raw: &Raw, fix: Option<&Fix>) -> Option<&Odometry> {
         let place = self.order.place(raw);
         let admitted = self.raw.admit_unsealed(raw, 1 + place.life, place.sequence).ok()?;
         self.ingest.step(raw, admitted.missing, admitted.new_epoch, &mut self.travel);
@@ -55,7 +60,7 @@ impl Chain {
         self.travel_sequence += 1;
         let admitted = self.travels.admit_unsealed(&self.travel, 1, self.travel_sequence).ok()?;
         let (travel, missing) = (&self.travel, admitted.missing);
-        let inputs = EstimatorInputs { travel, missing, fix: None, restore: None };
+        let inputs = EstimatorInputs { travel, missing, fix, restore: None };
         self.estimator.step(inputs, &mut self.odometry);
         self.odometry_sequence += 1;
         self.odometry.header.sequence = self.odometry_sequence;

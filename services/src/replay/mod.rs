@@ -4,6 +4,7 @@ mod chain;
 mod comparison;
 mod filters;
 mod input;
+mod learning;
 mod live;
 mod order;
 mod pure;
@@ -13,7 +14,7 @@ mod summary;
 mod track;
 mod uptake;
 
-pub use filters::{FilterDrift, Filtered, by_filters};
+pub use filters::{FilterDrift, Filtered, by_filters, drift_within};
 pub use input::{Described, Input, describe, find, only_source};
 pub use order::{Order, Place};
 pub use uptake::Uptaker;
@@ -31,6 +32,7 @@ use crate::exit::{Exit, Failure};
 use crate::output;
 use crate::service::{Service, ServiceArgs, check_speed};
 use comparison::Comparison;
+use learning::Lesson;
 use track::Track;
 
 /// What `replay` is asked.
@@ -44,6 +46,13 @@ pub struct ReplayArgs {
     /// Run the stages in this process alone, without starting a stack: the same odometry, bit for bit.
     #[arg(long)]
     pub pure: bool,
+    /// Give the reference up to this share of the drive's time to the estimator as fixes, and judge it on the rest.
+    #[arg(long, value_name = "SHARE", requires = "pure", value_parser = learning::parse_share)]
+    pub fixes: Option<f64>,
+    /// Fixes per second.
+    #[arg(long, value_name = "HZ", default_value_t = 2.0, requires = "fixes",
+          value_parser = learning::parse_rate)]
+    pub fix_rate: f64,
     /// Vehicle, in place of the input's own: a file, or the name of a shipped one.
     #[arg(long, value_name = "FILE")]
     pub vehicle: Option<String>,
@@ -124,6 +133,8 @@ struct Finished {
     rolled: Vec<[f64; 4]>,
     refusals: Vec<(&'static str, u64)>,
     comparison: Comparison,
+    /// The same drive with fixes, where they were asked for.
+    lesson: Option<Lesson>,
     speeds: Speeds,
     problem: Option<String>,
     notes: Vec<String>,
@@ -173,7 +184,7 @@ fn path_of(source: &Source) -> &Path {
 }
 
 fn run_one(args: &ReplayArgs, source: &Source, folder: &Path) -> Result<Finished, Failure> {
-    let job = job(args, source, folder)?;
+    let mut job = job(args, source, folder)?;
     let raws = &job.input.raws;
     let duration = duration_of(raws);
     let pure = pure::run(&job.service, raws)?;
@@ -199,6 +210,11 @@ fn run_one(args: &ReplayArgs, source: &Source, folder: &Path) -> Result<Finished
     }
     let comparison = Comparison::of(&job.input, &track)?;
     notes.extend(comparison.notes(&job.input, &track));
+    let asked = args.fixes.map(|share| learning::Asked { share, rate: args.fix_rate });
+    let lesson = match asked {
+        Some(asked) => Some(learning::learn(&mut job, &comparison, &track, &asked)?),
+        None => None,
+    };
     let report = folder.join("report.html");
     let finished = Finished {
         job,
@@ -208,6 +224,7 @@ fn run_one(args: &ReplayArgs, source: &Source, folder: &Path) -> Result<Finished
         rolled: pure.rolled,
         refusals: pure.refusals,
         comparison,
+        lesson,
         speeds,
         problem,
         notes,
@@ -249,6 +266,8 @@ fn command_line(args: &ReplayArgs, source: &Source) -> String {
     let mut words = vec!["kerbside replay".to_owned(), path_of(source).display().to_string()];
     words.extend(args.pure.then(|| "--pure".to_owned()));
     words.extend(args.speed.map(|speed| format!("--speed {speed}")));
+    let fixes = |share: f64| format!("--fixes {share} --fix-rate {}", args.fix_rate);
+    words.extend(args.fixes.map(fixes));
     words.extend(args.vehicle.as_ref().map(|vehicle| format!("--vehicle {vehicle}")));
     words.extend(args.config.as_ref().map(|config| format!("--config {}", config.display())));
     words.join(" ")

@@ -5,8 +5,10 @@ use std::path::Path;
 use comfy_table::Cell;
 use kerbside_geometry::angle;
 use kerbside_messages::EstimatorState;
+use kerbside_recordings::drift::Drift;
 use serde_json::{Map, Value, json};
 
+use super::learning::Lesson;
 use super::report::{filter_of, model_of};
 use super::{Finished, Outcome, ReplayArgs, sensing};
 use crate::exit::{Exit, Failure};
@@ -102,6 +104,7 @@ fn one_as_json(one: &Finished) -> Value {
         "speed_factor_memory": one.speeds.memory,
         "odometry_sha256": one.hash,
         "drift": drift,
+        "fixes": one.lesson.as_ref().map(lesson_as_json),
         "cause": one.problem.clone().unwrap_or_default(),
         "notes": one.notes,
         "instance": live.then(|| one.job.service.instance.name()),
@@ -153,6 +156,9 @@ fn print_one(one: &Finished) {
     row("pose", state_of(one).to_owned());
     row("speed", speeds_in_words(one));
     println!("{table}");
+    if let Some(lesson) = &one.lesson {
+        print_lesson(lesson);
+    }
     one.notes.iter().for_each(|note| println!("note       {note}"));
     println!("sha-256    {}", one.hash);
     println!("report     {}", one.report.display());
@@ -160,6 +166,71 @@ fn print_one(one: &Finished) {
         println!("recording  {}", recording.display());
     }
     println!("repeat     {}", one.job.command_line);
+}
+
+/// What was learnt, per parameter, and what that does to the drift.
+fn lesson_as_json(lesson: &Lesson) -> Value {
+    let parameters: Map<_, _> = lesson
+        .learnt
+        .iter()
+        .map(|learnt| {
+            let (value, spread) = (learnt.value, 1.96 * learnt.deviation);
+            let entry = json!({
+                "value": value, "low": value - spread, "high": value + spread, "unit": learnt.parameter.unit(),
+                "nominal": learnt.nominal, "deviation": learnt.deviation, "prior_deviation": learnt.prior,
+            });
+            (learnt.parameter.name().to_owned(), entry)
+        })
+        .collect();
+    let rest = |drift: &Result<Drift, String>| {
+        drift.as_ref().ok().map(|drift| {
+            let end = drift.end_error;
+            json!({
+                "position_percent": drift.position_percent,
+                "heading_rad_per_m": drift.heading_rad_per_m,
+                "end_error": { "x": end.x, "y": end.y, "yaw": end.yaw },
+            })
+        })
+    };
+    json!({
+        "share": lesson.share, "given": lesson.given, "taken": lesson.taken, "parameters": parameters,
+        "rest": { "without": rest(&lesson.without), "with": rest(&lesson.with) },
+    })
+}
+
+fn print_lesson(lesson: &Lesson) {
+    let percent = 100.0 * lesson.share;
+    println!(
+        "fixes over the first {percent:.0} % of the time: {} of {} taken",
+        lesson.taken, lesson.given
+    );
+    if lesson.taken < lesson.given {
+        println!("the others contradict the pose beyond what [calibration] or [uncertainty] of");
+        println!("vehicle.toml leaves open: calibrate first, or state more");
+    }
+    let header = ["parameter", "vehicle.toml", "learnt", "95 %", "before"];
+    let mut table = tables::figures(&header, &[1, 2, 3, 4]);
+    for learnt in &lesson.learnt {
+        table.add_row([
+            format!("{} [{}]", learnt.parameter.name(), learnt.parameter.unit()),
+            format!("{:.5}", learnt.nominal),
+            format!("{:.5}", learnt.value),
+            format!("\u{b1}{:.5}", 1.96 * learnt.deviation),
+            format!("\u{b1}{:.5}", 1.96 * learnt.prior),
+        ]);
+    }
+    println!("{table}");
+    let words = |drift: &Result<Drift, String>| match drift {
+        Ok(drift) => format!(
+            "{:.2} %, {} rad/m, end off by {:.3} m",
+            drift.position_percent,
+            significant(drift.heading_rad_per_m),
+            drift.end_error.distance()
+        ),
+        Err(why) => why.clone(),
+    };
+    println!("drift on the rest without   {}", words(&lesson.without));
+    println!("drift on the rest with      {}", words(&lesson.with));
 }
 
 fn refusals_in_words(one: &Finished) -> String {

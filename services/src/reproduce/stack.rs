@@ -1,4 +1,4 @@
-//! The two parking scenes by the whole stack: in lockstep, and through the real processes where asked.
+//! The parking scenes by the whole stack: in lockstep, and through the real processes where asked.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use crate::lockstep::Script;
 use crate::output;
 use crate::park::{self, ParkArgs};
 
-/// The scenes of the paper's Table 3.
-const SCENES: [&str; 2] = ["garage", "parallel"];
+/// The scenes of the paper's Table 3, and the same again full size.
+const SCENES: [&str; 4] = ["garage", "parallel", "garage-full-size", "parallel-full-size"];
 
 /// Parks each scene `runs` times in lockstep, and once through processes where `processes` says so.
 ///
@@ -53,6 +53,7 @@ fn one_scene(
         runs,
         rearm: false,
         vehicle: None,
+        effects: None,
         config: None,
         instance: None,
         out: None,

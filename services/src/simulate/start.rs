@@ -6,6 +6,9 @@ use kerbside_simulation::{Trajectory, body_from_reference};
 
 use super::input::Case;
 
+const MOVING: &str =
+    "the car moves from the start: the reference's first row alone says where that is";
+
 /// Where the body stands at t = 0.
 pub(super) struct Start {
     /// The pose.
@@ -60,22 +63,35 @@ pub(super) fn start(
     if let (Some(sin), Some(cos)) = (sin, cos) {
         let shown = Pose::new(x, y, math::atan2(sin, cos));
         let pose = body_from_reference(&case.vehicle, &case.effects, &shown);
-        let note = "the car moves from the start: the reference's first row is taken for it";
-        return Start { pose, note: moving.then(|| note.to_owned()) };
+        if moving {
+            return Start::noted(back(case, &drive(pose), pose, first.t), MOVING);
+        }
+        return Start { pose, note: None };
     }
     // The marker where it was seen, the heading such that the first way leads where it led.
     let place =
         |shown_yaw| body_from_reference(&case.vehicle, &case.effects, &Pose::new(x, y, shown_yaw));
     let pose = place(0.0);
     let turn = heading(case, &drive(pose), &rows, (x, y));
+    let mut pose = place(turn);
+    if moving {
+        pose = back(case, &drive(pose), pose, first.t);
+    }
     let note = "the reference shows no yaw: the heading at the start is that of the first motion";
-    Start::noted(place(turn), note)
+    Start::noted(pose, note)
+}
+
+/// Where a body began that stands at `pose` when the reference stamps `t`, `simulated` being its drive had it begun at
+/// `pose`.
+fn back(case: &Case, simulated: &Trajectory, pose: Pose, t: f64) -> Pose {
+    let reached = body_from_reference(&case.vehicle, &case.effects, &simulated.reference(t));
+    pose.compose(&reached.inverse().compose(&pose))
 }
 
 /// By how much the simulated way must be turned to lead where the reference's first wheelbase of way led \[rad\].
 fn heading(case: &Case, simulated: &Trajectory, rows: &[&ReferenceRow], (x, y): (f64, f64)) -> f64 {
     let (mut dot, mut cross) = (0.0, 0.0);
-    let begin = simulated.reference(0.0);
+    let begin = simulated.reference(rows.first().map_or(0.0, |row| row.t));
     for row in rows {
         let (Some(row_x), Some(row_y)) = (row.x, row.y) else { continue };
         let (seen_x, seen_y) = (row_x - x, row_y - y);

@@ -8,11 +8,14 @@ mod reporter;
 mod stage;
 
 use std::os::fd::AsFd;
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use kerbside_geometry::{Pose, angle};
 use kerbside_messages::{Nanos, Process, Truth};
 use kerbside_runtime::{FileLock, Instance, LockError, Ticker, now, poll_readable};
+use kerbside_settings::load_overlay;
+use kerbside_simulation::Effects;
 
 pub use stage::{Making, VehicleStage};
 
@@ -42,6 +45,9 @@ pub struct VehicleArgs {
     /// Seed of its sensors' noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Overlay: effects by which it differs from its description.
+    #[arg(long, value_name = "FILE")]
+    pub effects: Option<PathBuf>,
     /// End together with the process that started this one.
     #[arg(long, value_name = "PID", hide = true)]
     pub with_parent: Option<u32>,
@@ -81,6 +87,7 @@ pub fn run(args: &VehicleArgs, service: Service) -> Result<Exit, Failure> {
     if let Some(parent) = args.with_parent {
         crate::parent::die_with_parent(parent);
     }
+    let overlay = args.effects.as_deref().map(load_overlay).transpose()?.unwrap_or_default();
     let stop = stop_flag()?;
     service.instance.create_folder()?;
     let _lock = take_lock(&service)?;
@@ -90,6 +97,7 @@ pub fn run(args: &VehicleArgs, service: Service) -> Result<Exit, Failure> {
     life::enter_realtime(&service, Process::Vehicle);
     let mut stage = VehicleStage::new(&Making {
         vehicle: service.vehicle.clone(),
+        effects: Effects::from(&overlay),
         start: args.start,
         seed: args.seed,
         boot: boot_id(),

@@ -6,13 +6,15 @@ use core::time::Duration;
 use kerbside_geometry::{Pose, Vehicle};
 use kerbside_line::{Frame, Hello, Sensors, VehicleEnd, VehicleEvent};
 use kerbside_messages::{Header, Nanos, Truth, nanos, seconds};
-use kerbside_simulation::{Noise, Simulator};
+use kerbside_simulation::{Effects, Noise, Simulator};
 
 /// What a simulated vehicle is made of.
 #[derive(Clone, Debug)]
 pub struct Making {
     /// The vehicle.
     pub vehicle: Vehicle,
+    /// What it differs by from that description.
+    pub effects: Effects,
     /// Where it stands at first.
     pub start: Pose,
     /// Seed of its sensors' noise.
@@ -37,8 +39,10 @@ impl VehicleStage {
     /// A vehicle that stands and waits for a host.
     #[must_use]
     pub fn new(making: &Making) -> Self {
+        let (vehicle, effects) = (&making.vehicle, &making.effects);
+        let noise = Noise::default();
         let mut simulator =
-            Simulator::new(&making.vehicle, making.start, &Noise::default(), making.seed);
+            Simulator::with_effects(vehicle, effects, making.start, &noise, making.seed);
         let period = period_of(&making.vehicle);
         let hello = hello_of(making, &simulator.reading(), period);
         Self { end: VehicleEnd::new(hello), simulator, period, time: 0, silent: true }
@@ -67,7 +71,7 @@ impl VehicleStage {
         // The vehicle's own layer of safety: commands that stay away are a command to stop.
         let silent = self.end.is_silent(time);
         if silent && !self.silent {
-            self.simulator.command(seconds(time), 0.0, self.simulator.steering());
+            self.simulator.halt(seconds(time));
         }
         self.silent = silent;
         while let Some(frame) = self.end.pending(time) {

@@ -123,6 +123,16 @@ pub fn percent(share: f64) -> String {
     with_unit(&three_digits(share * 100.0), "%")
 }
 
+/// A probability; what is rounded to certainty says that it is no such thing.
+#[must_use]
+pub fn probability(value: f64) -> String {
+    match value {
+        certain if certain > 0.995 => ">\u{202f}0.99".to_owned(),
+        none if none < 0.005 => "<\u{202f}0.01".to_owned(),
+        between => fixed(between, 2),
+    }
+}
+
 /// A count, its thousands apart.
 #[must_use]
 pub fn count(value: u64) -> String {
@@ -204,6 +214,14 @@ mod tests {
         assert_eq!(interval([0.612, 0.52, 0.703]), "0.612 (0.520 to 0.703)");
         assert_eq!(interval([0.05, 0.05, 0.05]), "0.05000 (0.05000 to 0.05000)");
         assert_eq!(interval([0.2, 0.1, f64::INFINITY]), "0.2000 (0.1000 to \u{2013})");
+    }
+
+    #[test]
+    fn nothing_is_certain() {
+        assert_eq!(probability(0.9999), ">\u{202f}0.99");
+        assert_eq!(probability(0.97), "0.97");
+        assert_eq!(probability(0.0), "<\u{202f}0.01");
+        assert_eq!(probability(f64::NAN), UNKNOWN);
     }
 
     #[test]

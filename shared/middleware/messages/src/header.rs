@@ -5,7 +5,7 @@ use crate::topics::Topic;
 use crate::{Nanos, Refusal};
 
 /// Version of all layouts together; part of every type name, so that processes of different builds refuse each other.
-pub const LAYOUT_VERSION: u16 = 2;
+pub const LAYOUT_VERSION: u16 = 3;
 
 layout! {
     /// The header every sample starts with.

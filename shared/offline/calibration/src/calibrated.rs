@@ -62,6 +62,9 @@ pub struct Calibrated {
     pub estimates: Vec<Estimate>,
     /// Covariance, in the order of [`PARAMETERS`]; 0 for what the sensors do not involve.
     pub covariance: Square,
+    /// Variances of the parameters from drive to drive, beyond what the readings' noise explains; 0 where there is nothing
+    /// beyond. The next drive's parameters scatter about these by both.
+    pub between: Vector,
     /// What the runs told, priors excluded.
     pub information: Information,
     /// Epsilons (the paper's, left minus right) and ratios.
@@ -95,8 +98,8 @@ pub struct Calibrated {
 /// Runs with findings that forbid their use are left out and named; the fit starts from the closed form.
 ///
 /// # Errors
-/// [`CalibrationError::NoRuns`] where none is left, what makes the last one useless where that is why, and
-/// [`CalibrationError::Diverged`].
+/// [`CalibrationError::NoRuns`] where there is none, [`CalibrationError::Unusable`] with every run's reason where none can
+/// be used, and [`CalibrationError::Diverged`].
 pub fn calibrate(
     runs: &[Run],
     vehicle: &Vehicle,
@@ -122,6 +125,7 @@ pub fn calibrate(
         parameters: *p,
         estimates: estimates(&fit, vehicle),
         covariance: fit.covariance,
+        between: fit.between,
         derived: derived(&fit, &prior.scale),
         inflation: fit.inflation,
         truth_mean_square: fit.truth,
@@ -150,7 +154,6 @@ fn sift<'a>(
     settings: &Settings,
 ) -> Result<Sifted<'a>, CalibrationError> {
     let (mut kept, mut condensed, mut rejected) = (Vec::new(), Vec::new(), Vec::new());
-    let mut last = None;
     for run in runs {
         let against: Vec<String> = findings
             .iter()
@@ -168,12 +171,19 @@ fn sift<'a>(
             }
             Err(error) => {
                 rejected.push(Rejected { run: run.name.clone(), why: error.to_string() });
-                last = Some(error);
             }
         }
     }
     if kept.is_empty() {
-        return Err(last.unwrap_or(CalibrationError::NoRuns));
+        let reason = |out: &Rejected| match out.why.strip_prefix("run ") {
+            Some(_) => out.why.clone(),
+            None => format!("run {}: {}", out.run, out.why),
+        };
+        let reasons: Vec<String> = rejected.iter().map(reason).collect();
+        return Err(match reasons.is_empty() {
+            true => CalibrationError::NoRuns,
+            false => CalibrationError::Unusable { reasons },
+        });
     }
     Ok((kept, condensed, rejected))
 }

@@ -3,7 +3,9 @@
 use kerbside_geometry::{Pose, Vehicle, WHEELS};
 
 use crate::error::CalibrationError;
+use crate::gyro::{Gyro, Turned};
 use crate::noise::Settings;
+use crate::parameters::Parameters;
 use crate::run::{ReferencePose, Run, Series};
 
 /// The steering readings within a block, weighed by travel.
@@ -30,6 +32,8 @@ pub(crate) struct Block {
     pub(crate) direction: f64,
     /// Steering; none without a sensor.
     pub(crate) steering: Option<Reading>,
+    /// What the gyro turned, where it alone tells how the vehicle turned.
+    pub(crate) turned_by_gyro: Option<Turned>,
     /// Stamp of its end \[s\].
     pub(crate) until: f64,
     /// Number of the comparison that the block belongs to.
@@ -45,12 +49,18 @@ pub(crate) enum Known {
     Distance(f64, f64),
     /// Net turn and its standard deviation \[rad\].
     Turn(f64, f64),
+    /// The turn since the gyro was last looked at, its bias in it.
+    Gyro(Turned),
 }
 
 /// Something known, and how many blocks were rolled by then.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Event {
     pub(crate) after: usize,
+    /// Stamp \[s\].
+    pub(crate) t: f64,
+    /// Speed of the wheels' common travel about then, without sign \[m/s\].
+    pub(crate) speed: f64,
     pub(crate) known: Known,
 }
 
@@ -65,8 +75,11 @@ pub(crate) struct Condensed {
     pub(crate) blocks: Vec<Block>,
     /// In order of `after`.
     pub(crate) events: Vec<Event>,
-    /// `body_from_marker`.
-    pub(crate) marker: Pose,
+    /// Whether a gyro alone tells how the vehicle turned.
+    pub(crate) spun: bool,
+    /// Whether a reference saw its marker, and whether that has a heading.
+    pub(crate) marked: bool,
+    pub(crate) headed: bool,
     /// Travel by the nominal radii \[m\].
     pub(crate) travel: f64,
     /// Stamp of its beginning \[s\].
@@ -75,6 +88,10 @@ pub(crate) struct Condensed {
 
 /// Share of the wheels' travel below which the vehicle turns on the spot.
 const SPIN: f64 = 0.2;
+/// Variance of a turn of which nothing is known \[rad^2\].
+const ANYHOW: f64 = 1.0;
+/// Time to either side over which a speed is taken \[s\].
+const ABOUT: f64 = 0.2;
 /// Poses of the start that are known by agreement are as good as exact \[m\], \[rad\].
 const AGREED: f64 = 1e-6;
 
@@ -96,25 +113,40 @@ impl Condensed {
         if base.travel() <= 0.0 {
             return Err(CalibrationError::NoMotion { run: name });
         }
-        let wheels = usable(wheels, steered, vehicle)
+        let gyro = run.yaw_rate.as_ref().and_then(Gyro::new);
+        let by_wheels = usable(wheels, steered, vehicle);
+        let spun = by_wheels.is_none() && gyro.is_some();
+        let by_gyro = [false, false, wheels[2], wheels[3]];
+        let wheels = by_wheels
+            .or((spun && (wheels[2] || wheels[3])).then_some(by_gyro))
             .ok_or_else(|| CalibrationError::NoHeading { run: name.clone() })?;
-        let known = known_of(run, settings, base.span());
+        let mut known = known_of(run, settings, base.span());
+        let headed = run.reference.iter().any(|reading| reading.yaw.is_some());
+        // A gyro's scale is taken on trust: where something else tells the heading, that does.
+        let told = headed || run.end_pose.is_some() || run.net_turn.is_some();
+        if let Some(gyro) = gyro.as_ref().filter(|_| !spun && !told) {
+            known.extend(looks_at(gyro, &base, settings));
+        }
         if known.iter().filter(|(_, known)| !is_agreed(known)).count() == 0 {
             return Err(CalibrationError::NoTruth { run: name });
         }
         let length = block_length(settings, steered, wheels);
-        let marker = vehicle.reference.map_or(Pose::default(), |reference| reference.marker);
         let mut condensed = Self {
             name,
             wheels,
             steered,
             blocks: Vec::new(),
             events: Vec::new(),
-            marker: if run.reference.is_empty() { Pose::default() } else { marker },
+            spun,
+            marked: !run.reference.is_empty(),
+            headed,
             travel: base.travel(),
             begin: base.span().0,
         };
         condensed.cut(run, &base, length, settings, known);
+        if let Some(gyro) = gyro.filter(|_| spun) {
+            condensed.spin(&gyro, settings);
+        }
         condensed.weigh(vehicle);
         Ok(condensed)
     }
@@ -143,15 +175,34 @@ impl Condensed {
                     turned: [0.0; 4],
                     direction: base.direction(from, to),
                     steering: cells.as_mut().map(|cells| cells.read(before, after, settings)),
+                    turned_by_gyro: None,
                     until: to,
                     comparison: comparison(before, settings),
                 });
                 from = to;
             }
-            while let Some((_, known)) = waiting.next_if(|(t, _)| *t <= to) {
-                self.events.push(Event { after: self.blocks.len(), known });
+            while let Some((t, known)) = waiting.next_if(|(t, _)| *t <= to) {
+                let (after, speed) = (self.blocks.len(), base.speed(t));
+                self.events.push(Event { after, t, speed, known });
             }
         }
+    }
+
+    /// Gives each block what the gyro turned since the one before; where it was silent, that the vehicle may have
+    /// turned anyhow.
+    fn spin(&mut self, gyro: &Gyro<'_>, settings: &Settings) {
+        let mut from = self.begin;
+        for block in &mut self.blocks {
+            let unknown = Turned { turn: 0.0, time: 0.0, variance: ANYHOW };
+            block.turned_by_gyro =
+                Some(gyro.turned(from, block.until, &settings.noise).unwrap_or(unknown));
+            from = block.until;
+        }
+    }
+
+    /// `body_from_marker`; the body itself where it was measured by hand.
+    pub(crate) fn marker(&self, parameters: &Parameters) -> Pose {
+        if self.marked { parameters.marker() } else { Pose::default() }
     }
 
     /// Gives each wheel its share of the common travel, from its own travel over the whole comparison: its reading
@@ -246,6 +297,22 @@ fn known_of(run: &Run, settings: &Settings, (from, to): (f64, f64)) -> Vec<(f64,
     known.extend(run.distance.map(|distance| (to, Known::Distance(distance, noise.distance))));
     known.extend(run.net_turn.map(|turn| (to, Known::Turn(turn, noise.turn))));
     known
+}
+
+/// What a gyro turned over each stretch on which the axles are compared.
+fn looks_at(gyro: &Gyro<'_>, base: &Base, settings: &Settings) -> Vec<(f64, Known)> {
+    let mut from = base.span().0;
+    let mut looks = Vec::new();
+    for to in base.boundaries(settings.comparison) {
+        // Over a silence nothing is said: the next look begins behind it.
+        let silent = Turned { turn: 0.0, time: 0.0, variance: f64::INFINITY };
+        let turned = gyro.turned(from, to, &settings.noise).unwrap_or(silent);
+        if to > from {
+            looks.push((to, Known::Gyro(turned)));
+        }
+        from = to;
+    }
+    looks
 }
 
 /// Readings within the run's span that are far enough from one another; first and last stay in any case.
@@ -353,6 +420,13 @@ impl Base {
     /// Travel by `t` \[m\].
     pub(crate) fn rolled(&self, t: f64) -> f64 {
         self.interpolate(&self.rolled, t)
+    }
+
+    /// Speed of the common travel about `t`, without sign \[m/s\].
+    fn speed(&self, t: f64) -> f64 {
+        let (begin, end) = self.span();
+        let (from, to) = ((t - ABOUT).max(begin), (t + ABOUT).min(end));
+        if to > from { (self.rolled(to) - self.rolled(from)) / (to - from) } else { 0.0 }
     }
 
     fn direction(&self, from: f64, to: f64) -> f64 {

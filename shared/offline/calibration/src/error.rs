@@ -6,6 +6,12 @@ pub enum CalibrationError {
     /// No run is left to calibrate with.
     #[error("no run is left to calibrate with")]
     NoRuns,
+    /// No run can be used, each for its own reason.
+    #[error("no run can be used:\n{}", reasons.join("\n"))]
+    Unusable {
+        /// Run and evidence, a sentence each.
+        reasons: Vec<String>,
+    },
     /// The run has no wheel with two readings or more.
     #[error("run {run}: no wheel was read twice")]
     NoWheels {
@@ -21,14 +27,14 @@ pub enum CalibrationError {
     /// The sensors of the run do not say how the vehicle turned.
     #[error(
         "run {run}: its sensors do not say how the vehicle turned: \
-         two rear wheels, or one wheel and a steering sensor are needed"
+         two rear wheels, or one wheel and a steering sensor or a gyro are needed"
     )]
     NoHeading {
         /// The run.
         run: String,
     },
-    /// Nothing in the run says where it led: no reference, end pose, distance or net turn.
-    #[error("run {run}: no reference, end pose, distance or net turn to compare with")]
+    /// Nothing in the run says where it led: no reference, end pose, distance, net turn or gyro beside the wheels.
+    #[error("run {run}: no reference, end pose, distance, net turn or gyro to compare with")]
     NoTruth {
         /// The run.
         run: String,

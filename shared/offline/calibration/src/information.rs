@@ -82,6 +82,8 @@ fn free_of(runs: &[&Condensed], vehicle: &Vehicle, settings: &Settings) -> [bool
         Parameter::Wheelbase => steered || front,
         Parameter::SteeringZero => steered,
         Parameter::SteeringGain => steered && settings.free_gain,
+        Parameter::MarkerX | Parameter::MarkerY => settings.free_marker && any(|run| run.marked),
+        Parameter::MarkerYaw => settings.free_marker && any(|run| run.headed),
     })
 }
 

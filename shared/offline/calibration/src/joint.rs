@@ -2,12 +2,13 @@
 
 use kerbside_geometry::{Pose, Vehicle};
 
+use crate::between::between;
 use crate::chain::{Normal, Square, Squares};
 use crate::condense::Condensed;
 use crate::error::CalibrationError;
 use crate::information::{Information, only_where_open, prior};
 use crate::noise::Settings;
-use crate::parameters::{Parameters, Vector};
+use crate::parameters::{COUNT, Parameters, Vector};
 use crate::solve::{Fit, Prior, first_start, fit};
 
 /// Why a run does not count.
@@ -34,6 +35,8 @@ pub struct RunResiduals {
     pub comparison: f64,
     /// How many of those there are.
     pub comparison_count: usize,
+    /// By how much the reference's stamps are late at the end, where that was fitted \[s\].
+    pub lag: Option<f64>,
     /// Estimated true pose at the start, reference frame.
     pub start: Pose,
 }
@@ -47,6 +50,8 @@ pub(crate) struct JointFit {
     pub(crate) covariance: Square,
     /// Factor on the variances: 1 where residuals are no larger than believed.
     pub(crate) inflation: f64,
+    /// Variances of the parameters from drive to drive; 0 where chance explains what differs.
+    pub(crate) between: Vector,
     /// Mean squares of the residuals of poses and of comparisons.
     pub(crate) truth: f64,
     pub(crate) comparison: f64,
@@ -104,8 +109,44 @@ fn robust(
         scale = next;
         state = fit(runs, state.parameters, state.starts, prior, settings, settings.huber * scale)?;
     }
-    let open = only_where_open(prior, &state.information(), settings);
-    fit(runs, state.parameters, state.starts, &open, settings, settings.huber * scale)
+    let open = held(prior, &state, settings);
+    let state = fit(runs, state.parameters, state.starts, &open, settings, settings.huber * scale)?;
+    without_strays(runs, state, &open, settings, settings.huber * scale)
+}
+
+/// Weak priors by which a parameter that the runs do not identify may be off its nominal value.
+const STRAY: f64 = 2.0;
+
+/// The fit again, with those parameters fixed at their nominal values that it does not identify and has yet drawn to where
+/// nobody believes them: there they make up for what the model leaves out, and spoil the others.
+fn without_strays(
+    runs: &[&Condensed],
+    state: Fit,
+    open: &Prior,
+    settings: &Settings,
+    limit: f64,
+) -> Result<Fit, CalibrationError> {
+    let told = Information::new(state.information() / typical(&state), open, settings);
+    let (mut fixed, mut parameters) = (*open, state.parameters);
+    for index in 0..COUNT {
+        let off = (parameters.values[index] - open.mean[index]).abs() / open.scale[index];
+        if open.free[index] && !told.identified[index] && off > STRAY {
+            fixed.free[index] = false;
+            parameters.values[index] = open.mean[index];
+        }
+    }
+    if fixed.free == open.free {
+        return Ok(state);
+    }
+    fit(runs, parameters, state.starts, &fixed, settings, limit)
+}
+
+/// The prior as the runs leave it open, in the unit of their residuals: where these are larger than believed the runs tell
+/// less, and what they leave open stays where the vehicle's file has it.
+fn held(prior: &Prior, state: &Fit, settings: &Settings) -> Prior {
+    let scale = typical(state);
+    let open = only_where_open(prior, &(state.information() / scale), settings);
+    Prior { weight: open.weight * scale, ..open }
 }
 
 /// Mean square of the residuals of the median run; 1 where they are as believed or smaller.
@@ -187,8 +228,12 @@ fn finish(
     settings: &Settings,
     rejected: Vec<Rejected>,
 ) -> Result<JointFit, CalibrationError> {
-    let information = Information::new(fit.information(), prior, settings);
-    let open = only_where_open(prior, &information.matrix, settings);
+    let mut information = Information::new(fit.information(), prior, settings);
+    let told = Information::new(information.matrix / typical(&fit), prior, settings);
+    information.identified = core::array::from_fn(|i| told.identified[i] && fit.free[i]);
+    let open = held(prior, &fit, settings);
+    let values = &fit.parameters.values;
+    let differs = between(&fit.normals, values, &information.identified, &open);
     let held = Information { matrix: information.matrix + open.weight, ..information.clone() };
     let covariance = held.covariance(&prior.scale).ok_or(CalibrationError::Diverged)?;
     let (truth, comparison) = totals(&fit);
@@ -201,13 +246,19 @@ fn finish(
         (mean_square(truth, poses + 0.5 * taken), mean_square(comparison, 0.5 * taken));
     let freedom = (truth.count + comparison.count).saturating_sub(3 * runs.len() + identified);
     let inflation = truth_mean.max(comparison_mean).max(1.0);
+    // What differs from drive to drive is no noise of the readings: it adds by runs, not by readings.
+    let covariance = match &differs {
+        Some(differs) => covariance * differs.within + covariance * differs.score * covariance,
+        None => covariance * inflation,
+    };
     let residuals = runs.iter().zip(&fit.normals).zip(&fit.starts);
     let residuals = residuals.map(|((run, normal), start)| residuals_of(run, normal, start));
     Ok(JointFit {
         parameters: fit.parameters,
         information,
-        covariance: covariance * inflation,
+        covariance,
         inflation,
+        between: differs.map_or_else(Vector::zeros, |differs| differs.variance),
         truth: truth_mean,
         comparison: comparison_mean,
         freedom,
@@ -236,6 +287,7 @@ fn residuals_of(run: &Condensed, normal: &Normal, start: &Pose) -> RunResiduals 
         truth_count: normal.truth.count,
         comparison: rms(normal.comparison, 0.0),
         comparison_count: normal.comparison.count,
+        lag: normal.lag,
         start: *start,
     }
 }

@@ -55,7 +55,7 @@ pub(crate) fn left_out(
             let run = runs[index];
             for source in [Source::Rear, Source::Front, Source::All] {
                 let error = |parameters: &Parameters| {
-                    end_error(run, &reckon(run, parameters, settings, source)?)
+                    end_error(run, parameters, &reckon(run, parameters, settings, source)?)
                 };
                 let (floor_position, floor_yaw) = floor(run, settings);
                 if let (Some(before), Some(after)) = (error(&nominal), error(&fit.parameters)) {

@@ -10,6 +10,7 @@
 //!   increments are chained from a start pose that is an unknown of the fit, wheel noise as process noise, the
 //!   reference's poses as measurements at both ends and along the way. What front wheels, rear wheels and steering
 //!   disagree on over some wheelbases enters beside it.
+//! - `between`: what differs from drive to drive, and what a calibration therefore has to allow for.
 //! - `information`, `missing`: what the runs tell, priors excluded, and which manoeuvre would tell the rest.
 //! - `left_out`, `steering_check`: dead reckoning on runs that the fit has not seen; the steering sensor against the
 //!   front wheels.
@@ -19,12 +20,14 @@
 //! Lengths are metres, angles radians. The paper's b is the track, its epsilon the left minus the right radius.
 
 mod ackermann;
+mod between;
 mod calibrated;
 mod chain;
 mod closed_form;
 mod condense;
 mod diagnose;
 mod error;
+mod gyro;
 mod information;
 mod joint;
 mod left_out;

@@ -92,6 +92,9 @@ fn absent(information: &Information, like: &Condensed, vehicle: &Vehicle) -> Vec
         Parameter::TrackRear => "encoders on both rear wheels",
         Parameter::SteeringGain => "to be asked for, and circles of at least two radii",
         Parameter::Wheelbase | Parameter::SteeringZero => "a steering sensor",
+        Parameter::MarkerX | Parameter::MarkerY | Parameter::MarkerYaw => {
+            "to be asked for, and a reference on curves to both sides"
+        }
     };
     let has = |parameter: &Parameter| match parameter {
         // A wheel that is not counted may not be there at all.
@@ -99,7 +102,10 @@ fn absent(information: &Information, like: &Condensed, vehicle: &Vehicle) -> Vec
         Parameter::RadiusRearRight => vehicle.track_rear > 0.0,
         Parameter::TrackFront => vehicle.track_front > 0.0,
         Parameter::TrackRear => vehicle.track_rear > 0.0,
-        Parameter::SteeringGain => false,
+        Parameter::SteeringGain
+        | Parameter::MarkerX
+        | Parameter::MarkerY
+        | Parameter::MarkerYaw => false,
         Parameter::SteeringZero => vehicle.steering_sensor.is_some() || like.steered,
         _ => true,
     };
@@ -196,7 +202,7 @@ impl Garage<'_> {
         });
         let angle = math::atan(p[6] * drive.curvature) * p[8] + p[7];
         let steering = Series { t: t.clone(), value: vec![angle; t.len()] };
-        let marker = self.vehicle.reference.map_or(Pose::default(), |reference| reference.marker);
+        let marker = self.parameters.marker();
         let seen = |t: f64, body: Pose| {
             let marker = body.compose(&marker);
             ReferencePose { t, x: marker.x, y: marker.y, yaw: Some(marker.yaw) }

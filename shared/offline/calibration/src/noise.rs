@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use kerbside_geometry::{Vehicle, WHEELS};
 
-use crate::parameters::{Parameters, Vector};
+use crate::parameters::{Parameter, Parameters, Vector};
 
 /// Believed noise of the sensors; standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,14 @@ pub struct Noise {
     /// Least time between readings of the reference whose errors are independent \[s\]: what comes sooner
     /// is not used.
     pub reference_interval: f64,
+    /// By which the reference's stamps may be late against the wheels', all through a run; 0: by nothing \[s\].
+    pub reference_lag: f64,
+    /// By which that wanders \[s/sqrt(s)\].
+    pub reference_wander: f64,
+    /// Of one reading of the gyro, white \[rad/s\].
+    pub gyro: f64,
+    /// Of the gyro's bias, another one in every run \[rad/s\].
+    pub gyro_bias: f64,
     /// Of a position measured by hand, each axis \[m\].
     pub hand_position: f64,
     /// Of a heading measured by hand \[rad\].
@@ -49,6 +57,10 @@ impl Noise {
             position: vehicle.reference.map_or(0.005, |reference| reference.position_noise),
             yaw: vehicle.reference.map_or(0.005, |reference| reference.yaw_noise),
             reference_interval: 0.1,
+            reference_lag: 0.0,
+            reference_wander: 0.0,
+            gyro: vehicle.gyro.map_or(0.003, |gyro| gyro.noise),
+            gyro_bias: 0.05,
             hand_position: 0.005,
             hand_yaw: 0.005,
             distance: 0.002,
@@ -68,8 +80,11 @@ pub struct Settings {
     pub comparison: f64,
     /// Whether the steering gain is fitted; else it stays at 1.
     pub free_gain: bool,
+    /// Whether the place of the reference's marker is fitted; else it stays as the vehicle's file states it.
+    pub free_marker: bool,
     /// Standard deviations of the weak priors about the nominal vehicle, each in its parameter's unit: 4 % of a
-    /// radius, 10 % of a track, 6 % of the wheelbase (3 mm, 30 mm and 30 mm for the 1:6 car), 0.1 rad, 0.1.
+    /// radius, 10 % of a track, 6 % of the wheelbase (3 mm, 30 mm and 30 mm for the 1:6 car), 0.1 rad, 0.1; a
+    /// fifth of the wheelbase and 0.05 rad of the marker's place.
     pub prior: Vector,
     /// A parameter whose standard deviation from the runs alone exceeds this share of the prior's is not identified.
     pub identified_share: f64,
@@ -92,6 +107,7 @@ impl Settings {
             block: 0.1 * vehicle.wheelbase,
             comparison: 2.0 * vehicle.wheelbase,
             free_gain: false,
+            free_marker: false,
             prior: prior(vehicle),
             identified_share: 0.5,
             huber: 3.0,
@@ -102,12 +118,18 @@ impl Settings {
     }
 }
 
+const MARKER_X: usize = Parameter::MarkerX.index();
+const MARKER_Y: usize = Parameter::MarkerY.index();
+const MARKER_YAW: usize = Parameter::MarkerYaw.index();
+
 fn prior(vehicle: &Vehicle) -> Vector {
     let nominal = Parameters::nominal(vehicle).values;
     // Of two wheels on the centre line nothing but the radius is known; a track of 0 stays 0.
     let shares = [0.04, 0.04, 0.04, 0.04, 0.1, 0.1, 0.06];
     Vector::from_fn(|index, _| match shares.get(index) {
         Some(share) if nominal[index] > 0.0 => share * nominal[index],
+        None if index == MARKER_X || index == MARKER_Y => 0.2 * vehicle.wheelbase,
+        None if index == MARKER_YAW => 0.05,
         _ => 0.1,
     })
 }

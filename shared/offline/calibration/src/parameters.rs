@@ -1,10 +1,11 @@
-//! What is identified: radii, tracks, wheelbase, and the steering sensor's zero and gain.
+//! What is identified: radii, tracks, wheelbase, the steering sensor's zero and gain, and the place of the reference's
+//! marker.
 
-use kerbside_geometry::{SteeringSensor, Vehicle, WHEELS, Wheel};
+use kerbside_geometry::{Pose, Reference, SteeringSensor, Vehicle, WHEELS, Wheel};
 use nalgebra::SVector;
 
 /// How many parameters there are.
-pub const COUNT: usize = 9;
+pub const COUNT: usize = 12;
 
 /// One number per parameter, in the order of [`PARAMETERS`].
 pub type Vector = SVector<f64, COUNT>;
@@ -30,6 +31,12 @@ pub enum Parameter {
     SteeringZero = 7,
     /// Sensor reading per road-wheel angle, beyond the zero \[-\].
     SteeringGain = 8,
+    /// Place of the reference's marker ahead of the rear-axle centre \[m\].
+    MarkerX = 9,
+    /// And to its left \[m\].
+    MarkerY = 10,
+    /// Heading of the marker in the body's frame \[rad\].
+    MarkerYaw = 11,
 }
 
 /// The parameters in index order.
@@ -43,6 +50,9 @@ pub const PARAMETERS: [Parameter; COUNT] = [
     Parameter::Wheelbase,
     Parameter::SteeringZero,
     Parameter::SteeringGain,
+    Parameter::MarkerX,
+    Parameter::MarkerY,
+    Parameter::MarkerYaw,
 ];
 
 impl Parameter {
@@ -65,6 +75,9 @@ impl Parameter {
             "wheelbase",
             "steering_zero",
             "steering_gain",
+            "marker.x",
+            "marker.y",
+            "marker.yaw",
         ][self as usize]
     }
 
@@ -72,7 +85,7 @@ impl Parameter {
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
-            Self::SteeringZero => "rad",
+            Self::SteeringZero | Self::MarkerYaw => "rad",
             Self::SteeringGain => "-",
             _ => "m",
         }
@@ -100,7 +113,11 @@ impl Parameters {
         let (front, rear) = (vehicle.track_front, vehicle.track_rear);
         let (zero, gain) =
             vehicle.steering_sensor.map_or((0.0, 1.0), |sensor| (sensor.offset, sensor.gain));
-        Self { values: Vector::from([fl, fr, rl, rr, front, rear, vehicle.wheelbase, zero, gain]) }
+        let marker = vehicle.reference.map_or(Pose::default(), |reference| reference.marker);
+        let base = vehicle.wheelbase;
+        let values =
+            [fl, fr, rl, rr, front, rear, base, zero, gain, marker.x, marker.y, marker.yaw];
+        Self { values: Vector::from(values) }
     }
 
     /// The value of one parameter, in its unit.
@@ -127,7 +144,14 @@ impl Parameters {
         self.values[left] - self.values[left + 1]
     }
 
-    /// `vehicle` with radii, tracks, wheelbase and the steering sensor's offset and gain replaced by these.
+    /// `body_from_marker`.
+    #[must_use]
+    pub fn marker(&self) -> Pose {
+        let of = |parameter| self.get(parameter);
+        Pose::new(of(Parameter::MarkerX), of(Parameter::MarkerY), of(Parameter::MarkerYaw))
+    }
+
+    /// `vehicle` with all these in place of its own.
     #[must_use]
     pub fn applied(&self, vehicle: &Vehicle) -> Vehicle {
         Vehicle {
@@ -140,6 +164,9 @@ impl Parameters {
                 gain: self.get(Parameter::SteeringGain),
                 ..sensor
             }),
+            reference: vehicle
+                .reference
+                .map(|reference| Reference { marker: self.marker(), ..reference }),
             ..vehicle.clone()
         }
     }

@@ -116,7 +116,7 @@ fn start_of(run: &Condensed, parameters: &Parameters, settings: &Settings) -> Po
         _ => None,
     });
     if let Some(marker) = first {
-        return marker.compose(&run.marker.inverse());
+        return marker.compose(&run.marker(parameters).inverse());
     }
     let early = run.blocks.len() / 5;
     let mut beginning = run.clone();
@@ -128,14 +128,14 @@ fn start_of(run: &Condensed, parameters: &Parameters, settings: &Settings) -> Po
 }
 
 /// How far `path` ends from what `run` knows of its last pose, or its distance.
-pub(crate) fn end_error(run: &Condensed, path: &Path) -> Option<EndError> {
+pub(crate) fn end_error(run: &Condensed, parameters: &Parameters, path: &Path) -> Option<EndError> {
     let start = path.poses.first()?.1;
     let mut error = None;
     for event in &run.events {
         let reckoned = path.poses.get(event.after)?.1;
         match event.known {
             Known::Pose { x, y, yaw, .. } if event.after > 0 => {
-                let marker = reckoned.compose(&run.marker);
+                let marker = reckoned.compose(&run.marker(parameters));
                 let (dx, dy) = (marker.x - x, marker.y - y);
                 let (sin, cos) = math::sin_cos(start.yaw);
                 let yaw = yaw.map(|yaw| angle::wrap(marker.yaw - yaw));

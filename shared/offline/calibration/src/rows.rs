@@ -2,7 +2,7 @@
 //!
 //! Every row is z = h (D, T): a rear wheel R a = D -+ T b_r/2; a front wheel's longitudinal travel R a cos d = D -+
 //! T b_f/2 (form b of section 2a); the lateral travel R a sin d = L T (form c), or tan(steering) D = L T where no
-//! front wheel is counted. Rows are summed over blocks without loss, as h does not depend on the block.
+//! front wheel is counted; a gyro's turn = T, its bias taken off elsewhere. Rows are summed over blocks without loss, as h does not depend on the block.
 
 use kerbside_geometry::math;
 use nalgebra::{Matrix2, SMatrix, SVector};
@@ -12,10 +12,12 @@ use crate::condense::{Block, Condensed};
 use crate::noise::Noise;
 use crate::parameters::{COUNT, Parameter, Parameters, Vector};
 
-/// Rows: fl, fr, rl, rr, lateral.
-pub(crate) const ROWS: usize = 5;
+/// Rows: fl, fr, rl, rr, lateral, gyro.
+pub(crate) const ROWS: usize = 6;
 /// Row of the lateral travel; also the place of the steering sensor's noise among the raw noises.
 const LATERAL: usize = 4;
+/// Row of the gyro's turn, where it alone tells it; and the place of its noise.
+pub(crate) const TURN: usize = 5;
 
 const TRACK_FRONT: usize = Parameter::TrackFront.index();
 const TRACK_REAR: usize = Parameter::TrackRear.index();
@@ -39,13 +41,18 @@ impl Used {
     /// All that the run offers.
     pub(crate) fn of(run: &Condensed) -> Self {
         let [fl, fr, rl, rr] = run.wheels;
-        Self { rows: [fl, fr, rl, rr, run.steered], sensed: run.steered }
+        Self { rows: [fl, fr, rl, rr, run.steered, run.spun], sensed: run.steered }
     }
 
     /// Of these only the given wheels' rows, the lateral one where `lateral`.
     pub(crate) fn only(self, wheels: [bool; 4], lateral: bool) -> Self {
         let rows = core::array::from_fn(|row| {
-            self.rows[row] && if row == LATERAL { lateral } else { wheels[row] }
+            self.rows[row]
+                && match row {
+                    LATERAL => lateral,
+                    TURN => true,
+                    wheel => wheels[wheel],
+                }
         });
         Self { rows, ..self }
     }
@@ -89,7 +96,7 @@ pub(crate) struct Disagreement {
 }
 
 /// The centre wheel's angle, how it depends on the parameters, and on the raw noises (four wheels' travel \[m\], the
-/// steering sensor's mean \[rad\]).
+/// steering sensor's mean and the gyro's turn \[rad\]).
 struct Steer {
     angle: f64,
     by_parameters: Vector,
@@ -143,6 +150,10 @@ impl Rows {
     pub(crate) fn of_block(block: &Block, p: &Parameters, noise: &Noise, used: Used) -> Self {
         let mut draft = Draft { rows: Self::empty(p, used), by_noise: Square::zeros() };
         draft.rear(block, p);
+        if let Some(turned) = block.turned_by_gyro.filter(|_| used.rows[TURN]) {
+            draft.rows.z[TURN] = turned.turn;
+            draft.by_noise[(TURN, TURN)] = 1.0;
+        }
         if let Some(reading) = block.steering.filter(|_| used.sensed) {
             // Two points stand for an angle that strays within the block.
             let angles = [reading.mean - reading.spread, reading.mean + reading.spread];
@@ -166,6 +177,7 @@ impl Rows {
             h[(row, 1)] = lever;
         }
         h[(LATERAL, 1)] = p.values[WHEELBASE];
+        h[(TURN, 1)] = 1.0;
         Self {
             z: SVector::zeros(),
             by_parameters: ByParameters::zeros(),
@@ -353,6 +365,7 @@ impl Draft {
         }
         let factor = block.steering.map_or(1.0, |reading| reading.variance_factor);
         raw[LATERAL] = noise.steering * noise.steering * factor;
+        raw[TURN] = block.turned_by_gyro.map_or(0.0, |turned| turned.variance);
         self.rows.covariance =
             self.by_noise * Square::from_diagonal(&raw) * self.by_noise.transpose();
         // Counts without noise would make a row exact.

@@ -143,7 +143,7 @@ pub struct Run {
     pub rotation: [Option<Series>; 4],
     /// Steering sensor: road-wheel angle of the equivalent centre wheel as read, left positive \[rad\].
     pub steering: Option<Series>,
-    /// Gyro \[rad/s\]; used as evidence, not for the fit.
+    /// Gyro \[rad/s\]: evidence, and in the fit where nothing else tells the heading.
     pub yaw_rate: Option<Series>,
     /// Readings of the reference in order of time.
     pub reference: Vec<ReferencePose>,

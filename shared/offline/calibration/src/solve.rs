@@ -39,6 +39,8 @@ pub(crate) struct Fit {
     pub(crate) starts: Vec<Pose>,
     pub(crate) normals: Vec<Normal>,
     pub(crate) cost: f64,
+    /// Which parameters were fitted; the others are where the prior has them.
+    pub(crate) free: [bool; crate::parameters::COUNT],
 }
 
 impl Fit {
@@ -60,7 +62,8 @@ impl Fit {
         let away = parameters.values - prior.mean;
         let cost = normals.iter().map(|normal| normal.cost).sum::<f64>()
             + away.dot(&(prior.weight * away));
-        cost.is_finite().then_some(Self { parameters, starts, normals, cost })
+        let free = prior.free;
+        cost.is_finite().then_some(Self { parameters, starts, normals, cost, free })
     }
 
     /// Information of all runs on the parameters, without any prior.
@@ -92,12 +95,17 @@ impl Fit {
             }
         }
         let change = scaled_solve(&matrix, &right, &prior.scale)?;
-        let starts = self.normals.iter().zip(&reduced).zip(&self.starts);
-        let starts = starts.map(|((normal, (_, _, inverse)), start)| {
+        Some((change, self.starts_after(&change)?))
+    }
+
+    /// The start poses that fit best once the parameters have moved by `change`.
+    pub(crate) fn starts_after(&self, change: &Vector) -> Option<Vec<Pose>> {
+        let moved = |(normal, start): (&Normal, &Pose)| {
+            let (_, _, inverse) = normal.reduced()?;
             let moved = inverse * (normal.right_start - normal.mixed.transpose() * change);
-            Pose::new(start.x + moved[0], start.y + moved[1], start.yaw + moved[2])
-        });
-        Some((change, starts.collect()))
+            Some(Pose::new(start.x + moved[0], start.y + moved[1], start.yaw + moved[2]))
+        };
+        self.normals.iter().zip(&self.starts).map(moved).collect()
     }
 }
 
@@ -157,7 +165,7 @@ pub(crate) fn first_start(run: &Condensed, parameters: &Parameters, settings: &S
         }
         at = event.after;
         if let Known::Pose { x, y, yaw, position_deviation, yaw_deviation } = event.known {
-            let marker = pose.compose(&run.marker);
+            let marker = pose.compose(&run.marker(parameters));
             pairs.push((
                 marker,
                 Pose::new(x, y, yaw.unwrap_or(f64::NAN)),

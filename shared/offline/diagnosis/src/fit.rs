@@ -242,4 +242,39 @@ impl Search<'_> {
     pub(crate) fn moved(&self, fit: &Fit, step: &DVector<f64>) -> Effects {
         self.effects(&fit.set, &self.stepped(&fit.at, &self.coordinates(&fit.set), step))
     }
+
+    /// A set at a point, where the last coordinate of `member` alone is fitted, by one step.
+    pub(crate) fn sized(
+        &self,
+        set: &[usize],
+        at: &[Vec<f64>],
+        member: usize,
+        projection: &Projection,
+    ) -> Fit {
+        let whole = self.whole(set, at, projection.runs());
+        let coordinates = self.coordinates(set);
+        let last = at[member].len() - 1;
+        let own = coordinates.iter().find(|(m, c, _)| *m == member && *c == last);
+        let mut there = at.to_vec();
+        let mut cost = self.cost_of(set, &there, projection, &whole);
+        if let Some((_, c, coordinate)) = own {
+            let slope = self.slope(set, at, (member, *c, coordinate), &whole, projection);
+            let products = projection.products(&self.bench.designs, &[&slope, &whole]);
+            let offset = (at[member][*c] - coordinate.centre) / coordinate.deviation;
+            let step = -(products[(0, 1)] + offset) / (products[(0, 0)] + 1.0);
+            let value = &mut there[member][*c];
+            *value = (*value + step * coordinate.deviation).clamp(coordinate.low, coordinate.high);
+            // The model is linear in a size: what the step gains is what it foretells.
+            let taken = (*value - at[member][*c]) / coordinate.deviation;
+            cost += taken * (2.0 * (products[(0, 1)] + offset) + taken * (products[(0, 0)] + 1.0));
+        }
+        let n = coordinates.len();
+        Fit {
+            set: set.to_vec(),
+            effects: self.effects(set, &there),
+            at: there,
+            cost,
+            normal: DMatrix::identity(n, n),
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use kerbside_geometry::Vehicle;
 use kerbside_simulation::Parameter;
 
-use crate::case::{Allowance, Case};
+use crate::case::{Allowance, Case, Wheels};
 
 /// A parameter that is never the diagnosis: it may be a little off its neutral value in any car.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +19,16 @@ pub(crate) struct Nuisance {
 const LENGTH: f64 = 0.002;
 const RADIUS: f64 = 0.0015;
 const LAG: f64 = 0.05;
+/// Acceleration of free fall \[m/s2\].
+const GRAVITY: f64 = 9.81;
+/// Slip of a tyre per force over load, along and across: one over its stiffness (Pacejka, *Tire and Vehicle Dynamics*,
+/// chapter 1, has 10 to 30 per unit of load).
+const CREEP: f64 = 0.025;
+const SIDE_CREEP: f64 = 0.06;
+/// Delay of a speed that is the mean over some tens of milliseconds \[s\].
+const MEAN_TIME: f64 = 0.008;
+/// Share by which the radius behind a reported speed is off.
+const ROUNDED: f64 = 0.002;
 
 /// The nuisances of a case.
 pub(crate) fn nuisances(case: &Case) -> Vec<Nuisance> {
@@ -27,7 +37,33 @@ pub(crate) fn nuisances(case: &Case) -> Vec<Nuisance> {
         Some(allowance) => stated(allowance, vehicle),
         None => ordinary(vehicle),
     };
+    for own in inherent(case) {
+        // What vehicle.toml states goes before.
+        if all.iter().all(|nuisance| nuisance.parameter != own.parameter) {
+            all.push(own);
+        }
+    }
     all.retain(|nuisance| nuisance.deviation > 0.0 && nuisance.deviation.is_finite());
+    all
+}
+
+/// What every car has and nobody states: tyres that creep in proportion to their force over their load, a linkage that
+/// is no rock, and wheel speeds that are means over a short time and computed with a rounded radius.
+fn inherent(case: &Case) -> Vec<Nuisance> {
+    let vehicle = &case.vehicle;
+    let mut all = Vec::new();
+    let mut put = |id: &str, name: &str, deviation: f64| {
+        let found = Parameter::of(id).filter(|parameter| parameter.definition().name == name);
+        all.extend(found.map(|parameter| Nuisance { parameter, deviation }));
+    };
+    put("acceleration_slip", "rate", 2.0 * CREEP / GRAVITY);
+    put("lateral_slip", "rate", SIDE_CREEP / GRAVITY);
+    put("understeer", "gradient", 0.3 * SIDE_CREEP / (GRAVITY * vehicle.wheelbase));
+    put("steering_compliance", "rate", 0.0003 / vehicle.limits.acceleration.max(1e-3));
+    if case.runs.iter().any(|run| matches!(run.wheels, Wheels::Speed(_))) {
+        put("encoder_delay", "delay", MEAN_TIME);
+        put("count_loss", "fraction", ROUNDED);
+    }
     all
 }
 

@@ -9,7 +9,7 @@ use crate::linear::Projection;
 /// Discs tried along the paths, for each radius.
 const PLACES: usize = 48;
 /// Begins of a floor's patch that are fitted in full.
-const PATCHES: usize = 3;
+const PATCHES: usize = 6;
 /// Rounds of a fit that only ranks.
 const BRIEF: usize = 3;
 /// Rounds of a fit that counts.
@@ -55,9 +55,57 @@ fn extended(
         if begins.len() > 8 { promising(search, &set, begins, &with, &projection) } else { begins };
     let rounds = if full { FULL } else { BRIEF };
     let fits = begins.iter().map(|begin| search.fit(&set, &with(begin), &projection, BRIEF));
-    let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let mut best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    if full && search.candidates[candidate].definition.id == "floor_patch" {
+        best = moved_about(search, best, &projection);
+    }
     Some(if rounds > BRIEF { search.fit(&set, &best.at, &projection, rounds) } else { best })
 }
+
+/// A patch whose place and radius are tried in all directions, from far to near: its edge makes many small valleys.
+fn moved_about(search: &Search<'_>, mut best: Fit, projection: &Projection) -> Fit {
+    let mut step = 1.2 * search.bench.extent.wheelbase;
+    let member = best.set.len() - 1;
+    while step > 0.04 * search.bench.extent.wheelbase {
+        let tries: Vec<Vec<Vec<f64>>> = COMPASS
+            .iter()
+            .map(|direction| {
+                let mut at = best.at.clone();
+                for (c, share) in direction.iter().enumerate() {
+                    let coordinate = &search.candidates[best.set[member]].coordinates[c];
+                    at[member][c] =
+                        (at[member][c] + share * step).clamp(coordinate.low, coordinate.high);
+                }
+                at
+            })
+            .collect();
+        let fits: Vec<Fit> =
+            tries.par_iter().map(|at| search.sized(&best.set, at, member, projection)).collect();
+        match fits.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost)) {
+            Some(next) if next.cost < best.cost - 0.05 => best = next,
+            _ => step *= 0.5,
+        }
+    }
+    best
+}
+
+/// Directions of a patch's x, y and radius.
+const COMPASS: [[f64; 3]; 14] = [
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [0.7, 0.7, 0.0],
+    [-0.7, 0.7, 0.0],
+    [0.7, -0.7, 0.0],
+    [-0.7, -0.7, 0.0],
+    [0.7, 0.0, 0.7],
+    [-0.7, 0.0, 0.7],
+    [0.0, 0.7, 0.7],
+    [0.0, -0.7, 0.7],
+];
 
 /// The begins whose last coordinate, changed alone, gains most.
 fn promising(

@@ -5,7 +5,7 @@ use kerbside_calibration::{
     closed_form, information,
 };
 use kerbside_geometry::{Pose, Vehicle, angle};
-use kerbside_odometry::ParameterPrior;
+use kerbside_odometry::{PARAMETERS as BELIEVED, ParameterPrior};
 use kerbside_proving_ground::{Driven, Physics, Reference, Residuals};
 use nalgebra::{SMatrix, SVector};
 
@@ -221,16 +221,17 @@ impl Told {
 
 /// The filter's parameters are relative in the radii, and have a gyro where the calibration has the steering's gain.
 fn prior(calibrated: &Calibrated, yard: &Yard) -> ParameterPrior {
-    let scale: [f64; PARAMETERS] = core::array::from_fn(|i| match i {
+    let scale: [f64; BELIEVED] = core::array::from_fn(|i| match i {
         0..=3 => 1.0 / calibrated.parameters.values[i],
         8 => 0.0,
         _ => 1.0,
     });
     let mut prior = ParameterPrior::known();
-    for i in 0..PARAMETERS {
-        for j in 0..PARAMETERS {
+    for i in 0..BELIEVED {
+        for j in 0..BELIEVED {
             prior.covariance[(i, j)] = scale[i] * scale[j] * calibrated.covariance[(i, j)];
         }
+        prior.covariance[(i, i)] += scale[i] * scale[i] * calibrated.between[i];
     }
     prior.wheel_noise = yard.sensors.encoders.as_ref().map(|encoders| encoders.noise);
     prior

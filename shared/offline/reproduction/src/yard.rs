@@ -155,3 +155,6 @@ pub(crate) fn reckon(run: &Run, parameters: &Parameters, front: bool) -> Pose {
     }
     pose
 }
+
+#[cfg(test)]
+mod tests;

@@ -38,6 +38,11 @@ impl Actuator {
         due.is_some_and(|value| self.lag.aim(self.wanted(value)))
     }
 
+    /// The command that keeps the value where it is.
+    pub(crate) fn holding(&self) -> f64 {
+        self.lag.value() / self.gain
+    }
+
     fn wanted(&self, command: f64) -> f64 {
         let wanted = command * self.gain;
         let wanted = if wanted.abs() < self.dead_zone { 0.0 } else { wanted };

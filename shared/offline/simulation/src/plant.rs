@@ -152,7 +152,9 @@ impl Plant {
             contact: Contact {
                 drive: vehicle.drive,
                 driven_radius: vehicle.driven_radius(),
-                radius: vehicle.radius,
+                radius: core::array::from_fn(|wheel| {
+                    vehicle.speed_radius[wheel].unwrap_or(vehicle.radius[wheel])
+                }),
                 wheelbase: vehicle.wheelbase,
                 track_front: vehicle.track_front,
                 track_rear: vehicle.track_rear,

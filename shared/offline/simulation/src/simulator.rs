@@ -109,6 +109,11 @@ impl Simulator {
         self.stepper.train.command(time, speed, steering);
     }
 
+    /// Commands to stop from `time` \[s\] plus the actuators' delays, the steering held where it stands now.
+    pub fn halt(&mut self, time: f64) {
+        self.command(time, 0.0, self.stepper.train.holding());
+    }
+
     /// Drives on until the time is `to` \[s\]; a time that is past changes nothing.
     pub fn advance(&mut self, to: f64) {
         if self.past.span > 0.0 {

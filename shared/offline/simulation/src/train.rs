@@ -63,6 +63,11 @@ impl Actuators {
             self.steering.command(time, steering);
         }
     }
+
+    /// The steering command that keeps the rack where it is \[rad\].
+    pub(crate) fn holding(&self) -> f64 {
+        self.steering.holding()
+    }
 }
 
 impl Train for Actuators {

@@ -17,6 +17,7 @@ impl Vehicle {
             track_front: 0.31,
             track_rear: 0.31,
             radius: [0.0725; 4],
+            speed_radius: [None; 4],
             drive: Drive::Rear,
             footprint: Footprint { length: 0.75, width: 0.37, rear_overhang: 0.13 },
             limits: Limits {

@@ -178,6 +178,10 @@ pub struct Vehicle {
     pub track_rear: f64,
     /// Wheel radii \[m\].
     pub radius: [f64; 4],
+    /// Radii by which the vehicle computes the wheel speeds that it reports \[m\]; none where these are `radius`.
+    ///
+    /// A calibration finds other radii; the vehicle goes on computing with its own.
+    pub speed_radius: [Option<f64>; 4],
     /// Which wheels the motor turns.
     pub drive: Drive,
     /// Outline.
@@ -206,6 +210,13 @@ impl Vehicle {
             (0.0, self.track_rear)
         };
         (x, if wheel.is_left() { 0.5 * track } else { -0.5 * track })
+    }
+
+    /// What a speed that the vehicle reports of `wheel` has to be multiplied by.
+    #[must_use]
+    pub fn speed_scale(&self, wheel: Wheel) -> f64 {
+        let radius = self.radius[wheel.index()];
+        self.speed_radius[wheel.index()].map_or(1.0, |used| radius / used)
     }
 
     /// Mean nominal radius of the driven wheels \[m\].

@@ -1,6 +1,7 @@
 //! What is uncertain about a vehicle's own numbers, and how the fused filter numbers it.
 
 use kerbside_geometry::Vehicle;
+use kerbside_messages::FilterState;
 use nalgebra::SMatrix;
 
 /// How many parameters the fused filter carries beside the pose.
@@ -31,6 +32,61 @@ pub enum Parameter {
 }
 
 impl Parameter {
+    /// All, in the order of their numbers.
+    pub const ALL: [Self; PARAMETERS] = [
+        Self::RadiusFrontLeft,
+        Self::RadiusFrontRight,
+        Self::RadiusRearLeft,
+        Self::RadiusRearRight,
+        Self::TrackFront,
+        Self::TrackRear,
+        Self::Wheelbase,
+        Self::SteeringZero,
+        Self::GyroBias,
+    ];
+
+    /// Name, as configuration and reports write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::RadiusFrontLeft => "radius.fl",
+            Self::RadiusFrontRight => "radius.fr",
+            Self::RadiusRearLeft => "radius.rl",
+            Self::RadiusRearRight => "radius.rr",
+            Self::TrackFront => "track_front",
+            Self::TrackRear => "track_rear",
+            Self::Wheelbase => "wheelbase",
+            Self::SteeringZero => "steering_zero",
+            Self::GyroBias => "gyro_bias",
+        }
+    }
+
+    /// Unit of its value.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::SteeringZero => "rad",
+            Self::GyroBias => "rad/s",
+            _ => "m",
+        }
+    }
+
+    /// What a deviation of 0 stands for, and what one of 1 adds to it \[m, rad or rad/s\].
+    #[must_use]
+    pub fn basis(self, vehicle: &Vehicle) -> (f64, f64) {
+        match self {
+            Self::TrackFront => (vehicle.track_front, 1.0),
+            Self::TrackRear => (vehicle.track_rear, 1.0),
+            Self::Wheelbase => (vehicle.wheelbase, 1.0),
+            // Offset and gain are taken out of every reading before.
+            Self::SteeringZero => {
+                vehicle.steering_sensor.map_or((0.0, 1.0), |sensor| (sensor.offset, sensor.gain))
+            }
+            Self::GyroBias => (0.0, 1.0),
+            radius => (vehicle.radius[radius.index()], vehicle.radius[radius.index()]),
+        }
+    }
+
     /// Row in a covariance of parameters.
     #[must_use]
     pub const fn index(self) -> usize {
@@ -90,4 +146,20 @@ pub struct ParameterEstimate {
     pub deviation: [f64; PARAMETERS],
     /// Their covariance.
     pub covariance: ParameterCovariance,
+}
+
+impl ParameterEstimate {
+    /// What the filter knew that sent `state`; none where it carries no parameters.
+    #[must_use]
+    pub fn of(state: &FilterState) -> Option<Self> {
+        let mut covariance = ParameterCovariance::zeros();
+        let mut lower = state.parameter_covariance.iter();
+        for row in 0..PARAMETERS {
+            for (column, entry) in (0..=row).zip(&mut lower) {
+                covariance[(row, column)] = *entry;
+                covariance[(column, row)] = *entry;
+            }
+        }
+        (state.basis != 0).then_some(Self { deviation: state.parameters, covariance })
+    }
 }

@@ -25,6 +25,8 @@ pub(crate) struct WheelScale {
     /// Width of the ring on which absolute counts become travel \[bit\]: the counter's, or less
     /// where the counter reaches farther than [`FARTHEST`].
     pub(crate) ring_bits: u32,
+    /// What a reported speed has to be multiplied by.
+    pub(crate) speed_scale: f64,
     /// Fastest that the wheel rolls when the rear-axle centre moves at `limits.speed` \[m/s\].
     pub(crate) top_speed: f64,
 }
@@ -60,10 +62,17 @@ impl WheelScale {
 /// # Errors
 /// [`NoModel::Field`] for counters that are none.
 pub(crate) fn scales(vehicle: &Vehicle, sensors: &Sensors) -> Result<[WheelScale; 4], NoModel> {
-    let mut all =
-        [WheelScale { metres_per_count: 0.0, counter_bits: 64, ring_bits: 64, top_speed: 0.0 }; 4];
+    let none = WheelScale {
+        metres_per_count: 0.0,
+        counter_bits: 64,
+        ring_bits: 64,
+        speed_scale: 1.0,
+        top_speed: 0.0,
+    };
+    let mut all = [none; 4];
     for wheel in WHEELS {
         let scale = &mut all[wheel.index()];
+        scale.speed_scale = vehicle.speed_scale(wheel);
         scale.top_speed = vehicle.limits.speed * speed_factor(vehicle, wheel);
         if sensors.signal == WheelSignal::Counts && sensors.wheels[wheel.index()] {
             (scale.metres_per_count, scale.counter_bits) = counting(vehicle, wheel)?;

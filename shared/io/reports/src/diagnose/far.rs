@@ -10,6 +10,8 @@ use crate::svg::{
     Rows, Ticks, Trace,
 };
 
+/// Height of a run's map, in figure units: level with the chart beside it.
+const LEVEL: f64 = 170.0;
 /// Runs drawn, at most.
 const DRAWN: usize = 6;
 const MEASURED: Line = Line::new(Ink::Green).wide();
@@ -142,6 +144,7 @@ impl DiagnoseReport {
         let description =
             format!("Paths of {}: measured, nominal, and with the effects.", run.name);
         let mut map = Map::small(&format!("path-{number}"), &run.name, &description, "m");
+        map.keep_within(LEVEL);
         let lines = [
             ("measured", MEASURED, &run.measured),
             ("nominal vehicle", NOMINAL, &run.nominal),

@@ -1,6 +1,6 @@
 //! The map: along the driven path, where the vehicle went astray and which way.
 
-use kerbside_diagnosis::MapPoint;
+use kerbside_diagnosis::{MapPoint, RunPaths};
 use kerbside_geometry::{Pose, math};
 
 use super::data::{DiagnoseReport, points};
@@ -13,10 +13,12 @@ const STEPS: [(f64, Ink, &str); 4] = [
     (2.0, Ink::Orange, "up to 5 floors"),
     (5.0, Ink::Vermilion, "more"),
 ];
+/// Points of all runs that are drawn, about.
+const DRAWN: usize = 6000;
 /// Arrows begin here: less is noise.
 const ASTRAY: f64 = 2.0;
 /// Arrows keep this share of the map's size from one another.
-const APART: f64 = 0.035;
+const APART: f64 = 0.06;
 /// Height of the map, in figure units: the chain and the map fit one screen.
 const TALLEST: f64 = 330.0;
 /// Points farther apart than this share of the map's size belong to no common line.
@@ -45,10 +47,13 @@ impl DiagnoseReport {
                 map.path(points(&run.measured), Line::new(Ink::Grey).thin());
             }
         }
+        let every = all().count().div_ceil(DRAWN).max(1);
+        let thin = |run: &RunPaths| run.map.iter().step_by(every).copied().collect::<Vec<_>>();
+        let ways: Vec<Vec<MapPoint>> = runs.iter().map(thin).collect();
         // What is worst lies on top.
         for (step, (_, ink, _)) in STEPS.iter().enumerate() {
-            for run in runs {
-                let line = pieces(&run.map, step, HOLE * size);
+            for way in &ways {
+                let line = pieces(way, step, HOLE * size);
                 map.path(line.clone(), Line::new(*ink).wide());
                 map.path(line, Line::new(*ink));
             }

@@ -4,9 +4,8 @@ use kerbside_diagnosis::Verdict as Answer;
 
 use super::data::{DiagnoseReport, plain};
 use super::place::capital;
-use super::which::probability;
 use crate::ReportError;
-use crate::format::{self, UNKNOWN, percent, significant, with_unit};
+use crate::format::{self, UNKNOWN, percent, probability, significant, with_unit};
 use crate::page::{Block, KeyFigure, Page, Section, Verdict};
 use crate::svg::Tone;
 

@@ -1,6 +1,7 @@
 //! Where: the chain of links with the gap of each.
 
 use kerbside_diagnosis::LinkGap;
+use kerbside_geometry::math;
 
 use super::data::{DiagnoseReport, plain, way};
 use crate::format::{self, significant, with_unit};
@@ -27,7 +28,7 @@ impl DiagnoseReport {
         let mut blocks = vec![Block::Figure(self.chain())];
         blocks.extend(self.map().map(Block::Figure));
         if !diagnosis.regime.is_empty() {
-            blocks.push(Block::Text(format!("The gap shows {}.", diagnosis.regime)));
+            blocks.push(Block::Text(format!("{}.", capital(&diagnosis.regime))));
         }
         blocks.push(Block::Table(table));
         Section::new("where", "Where the gap lies", blocks).with_lead(
@@ -40,7 +41,7 @@ impl DiagnoseReport {
         let gaps = &self.diagnosis.links;
         let reach = gaps.iter().filter(|gap| gap.measured).map(|gap| {
             let allowed = allowed(gap);
-            1.05 * (1.0 + gap.high.max(gap.excess) / allowed)
+            1.05 * (gap.gap / allowed).max(beside(gap.high, allowed))
         });
         let reach = reach.filter(|reach| reach.is_finite()).fold(REACH[0], f64::max).min(REACH[1]);
         let legend = vec![
@@ -50,7 +51,7 @@ impl DiagnoseReport {
             Legend::whisker("90 % interval of the excess"),
         ];
         let panel = Panel {
-            title: "gap, in multiples of noise floor and allowance".to_owned(),
+            title: "gap, in multiples of what noise and allowance make together".to_owned(),
             range: Range::new(0.0, reach),
             share: 1.0,
             words: 150.0,
@@ -96,12 +97,15 @@ impl DiagnoseReport {
         ];
         let beyond = gap.excess > 0.0;
         if beyond {
-            let bar = Bar::new(1.0, 1.0 + share(gap.excess), Ink::Vermilion);
+            let bar = Bar::new(1.0, share(gap.gap).max(1.0), Ink::Vermilion);
             bars.push(if self.is_named(gap) { bar } else { bar.pale() });
         }
-        let interval = [1.0 + share(gap.low), 1.0 + share(gap.high)];
+        let interval = [gap.low, gap.high].map(|excess| beside(excess, allowed));
         let gap_words = with_unit(&significant(gap.gap, 2), gap.unit);
-        let words = format!("{gap_words}, {} allowed", significant(gap.floor + gap.allowance, 2));
+        let words = format!(
+            "{gap_words}, {} allowed",
+            significant(math::hypot(gap.floor, gap.allowance), 2)
+        );
         Cell { bars, whisker: (gap.high > 0.0).then_some(interval), dots: Vec::new(), words }
     }
 
@@ -125,9 +129,15 @@ impl DiagnoseReport {
     }
 }
 
-/// What noise and a car in good order explain of a gap; never nothing, so that it can be divided by.
+/// What noise and a car in good order explain of a gap, which have nothing to do with one another; never nothing, so
+/// that it can be divided by.
 fn allowed(gap: &LinkGap) -> f64 {
-    (gap.floor + gap.allowance).max(1e-12)
+    math::hypot(gap.floor, gap.allowance).max(1e-12)
+}
+
+/// The gap that has this excess, in multiples of what is allowed.
+fn beside(excess: f64, allowed: f64) -> f64 {
+    math::hypot(1.0, excess / allowed)
 }
 
 fn unmeasured() -> Cell {

@@ -3,8 +3,7 @@
 use kerbside_diagnosis::{Alternative, FoundEffect, Verdict};
 
 use super::data::{DiagnoseReport, plain};
-use super::which::probability;
-use crate::format;
+use crate::format::{self, probability};
 use crate::page::{Block, Row, Section, Table};
 
 /// Sizes per row of the table of what would have been seen.

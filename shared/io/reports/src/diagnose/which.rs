@@ -13,7 +13,8 @@ const DRAWN: usize = 10;
 impl DiagnoseReport {
     pub(super) fn which_section(&self) -> Section {
         let lead = "Every set of effects is fitted and compared on runs left out of the fit. \
-                    A dot is a run: to the right of 0 the set of effects predicts it better than no effect.";
+                    A dot is a run: to the right of 0 it is predicted better than without any effect, or better \
+                    than by the likeliest.";
         let blocks = match self.diagnosis.ranking.is_empty() {
             true => vec![Block::Text("No rival was fitted.".to_owned())],
             false => vec![Block::Figure(self.rivals())],
@@ -24,23 +25,23 @@ impl DiagnoseReport {
     fn rivals(&self) -> Figure {
         let rivals = &self.diagnosis.ranking;
         let drawn = &rivals[..rivals.len().min(DRAWN)];
-        let gains = drawn.iter().flat_map(|rival| &rival.left_out).map(|gain| deviations(*gain));
-        let reach = Range::covering(gains.chain([0.0, 1.0]));
         let mut panels = vec![Panel {
             title: "probability".to_owned(),
             range: Range::new(0.0, 1.0),
-            share: 1.0,
+            share: 0.7,
             words: 44.0,
             limits: Vec::new(),
         }];
-        if drawn.iter().any(|rival| !rival.left_out.is_empty()) {
-            panels.push(Panel {
-                title: "gain on each run while left out, in standard deviations".to_owned(),
-                range: reach.unwrap_or(Range::new(0.0, 1.0)).padded(0.04),
-                share: 1.5,
-                words: 0.0,
-                limits: vec![0.0],
-            });
+        let titles = ["over no effect [standard deviations]", "over the likeliest"];
+        let sides = [
+            drawn.iter().flat_map(over_nothing).collect(),
+            drawn.iter().flat_map(|rival| over(rival, &drawn[0])).collect(),
+        ];
+        for (title, gains) in titles.into_iter().zip(sides) {
+            let gains: Vec<f64> = gains;
+            if gains.iter().any(|gain| gain.is_finite()) {
+                panels.push(panel(title, gains));
+            }
         }
         let figure = Rows {
             id: "rivals".to_owned(),
@@ -68,20 +69,23 @@ impl DiagnoseReport {
         let ink = if chosen { Ink::Blue } else { Ink::Grey };
         let first = Cell {
             bars: vec![Bar::new(0.0, rival.probability, ink)],
-            words: probability(rival.probability),
+            words: format::probability(rival.probability),
             ..Cell::default()
         };
-        let run = |index: usize| self.runs.get(index).map_or("a run", String::as_str);
-        let dot = |(index, gain): (usize, &f64)| {
-            let gain = deviations(*gain);
-            (gain, format!("{}: {}", run(index), format::signed(gain, 1)))
+        let dots = |gains: Vec<f64>| {
+            let run = |index: usize| self.runs.get(index).map_or("a run", String::as_str);
+            let dot = |(index, gain): (usize, f64)| {
+                (gain, format!("{}: {}", run(index), format::signed(gain, 1)))
+            };
+            Cell { dots: gains.into_iter().enumerate().map(dot).collect(), ..Cell::default() }
         };
-        let dots = rival.left_out.iter().enumerate().map(dot).collect();
+        let likeliest = self.diagnosis.ranking.first();
+        let against = likeliest.map_or_else(Vec::new, |likeliest| over(rival, likeliest));
         BarRow {
             name: plain(&rival.name),
             note: if chosen { self.sizes(rival) } else { String::new() },
             weight: if chosen { RowWeight::Strong } else { RowWeight::Normal },
-            cells: vec![first, Cell { dots, ..Cell::default() }],
+            cells: vec![first, dots(over_nothing(rival)), dots(against)],
         }
     }
 
@@ -109,19 +113,34 @@ fn size(parameter: &FoundParameter) -> String {
     format!("{} {}", plain(parameter.name), format::with_unit(&value, parameter.unit))
 }
 
+/// A panel of gains.
+fn panel(title: &str, gains: Vec<f64>) -> Panel {
+    let range = Range::covering(gains.into_iter().chain([-0.5, 0.5]));
+    Panel {
+        title: title.to_owned(),
+        range: range.unwrap_or(Range::new(0.0, 1.0)).padded(0.04),
+        share: 1.0,
+        words: 0.0,
+        limits: vec![0.0],
+    }
+}
+
+/// Gains over no effect, on each run while it was left out.
+fn over_nothing(rival: &Rival) -> Vec<f64> {
+    rival.left_out.iter().map(|gain| deviations(*gain)).collect()
+}
+
+/// The same over another rival; nothing over itself.
+fn over(rival: &Rival, other: &Rival) -> Vec<f64> {
+    let pairs = rival.left_out.iter().zip(&other.left_out);
+    let gains = pairs.map(|(gain, other)| deviations(gain - other));
+    if rival.name == other.name { Vec::new() } else { gains.collect() }
+}
+
 /// A gain in log-likelihood, given twice, as the standard deviations of a difference that would weigh as much; what
 /// speaks against is negative.
 fn deviations(gain: f64) -> f64 {
     gain.abs().sqrt().copysign(gain)
-}
-
-/// A probability; what is rounded to certainty says that it is no such thing.
-pub(super) fn probability(value: f64) -> String {
-    match value {
-        certain if certain > 0.995 => ">\u{202f}0.99".to_owned(),
-        none if none < 0.005 => "<\u{202f}0.01".to_owned(),
-        between => format::fixed(between, 2),
-    }
 }
 
 #[cfg(test)]
@@ -131,13 +150,5 @@ mod tests {
     #[test]
     fn gains_keep_their_sign() {
         assert_eq!([deviations(9.0), deviations(-4.0), deviations(0.0)], [3.0, -2.0, 0.0]);
-    }
-
-    #[test]
-    fn nothing_is_certain() {
-        assert_eq!(probability(0.9999), ">\u{202f}0.99");
-        assert_eq!(probability(0.97), "0.97");
-        assert_eq!(probability(0.0), "<\u{202f}0.01");
-        assert_eq!(probability(f64::NAN), format::UNKNOWN);
     }
 }

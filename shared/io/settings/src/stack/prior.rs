@@ -58,7 +58,7 @@ impl Stack {
         let unit = |parameter: Parameter| self.vehicle.radius.get(parameter.index()).copied();
         for (row, one) in IDENTIFIED {
             for (column, other) in IDENTIFIED {
-                if let Some(covariance) = calibration.covariance_of(row, column) {
+                if let Some(covariance) = calibration.covariance_in_use(row, column) {
                     let units = unit(one).unwrap_or(1.0) * unit(other).unwrap_or(1.0);
                     prior.covariance[(one.index(), other.index())] = covariance / units;
                 }

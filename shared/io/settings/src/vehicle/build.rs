@@ -39,6 +39,7 @@ pub(super) fn vehicle(reading: &Reading<'_, VehicleDraft>, draft: VehicleDraft) 
         track_front: draft.track[0],
         track_rear: draft.track[1],
         radius: draft.radius,
+        speed_radius: draft.speed_radius,
         drive: draft.drive,
         footprint: draft.footprint,
         limits: draft.limits,

@@ -17,6 +17,9 @@ pub const CALIBRATED: &[&str] = &[
     "wheelbase",
     "steering_sensor.offset",
     "steering_sensor.gain",
+    "reference.marker.x",
+    "reference.marker.y",
+    "reference.marker.yaw",
 ];
 
 /// A calibration that the vehicle's values come from.
@@ -41,9 +44,22 @@ pub struct Calibration {
     /// Their covariance, rows and columns in the order of `parameters`, each in its key's unit; empty where the
     /// method gives none.
     pub covariance: Vec<Vec<f64>>,
+    /// Standard deviations of `parameters` from drive to drive, beyond what the readings' noise explains; empty where
+    /// there is nothing beyond.
+    pub allowance: Vec<f64>,
 }
 
 impl Calibration {
+    /// Covariance of two parameters in the next drive: of what was found, and on the diagonal of what differs from drive to
+    /// drive. See [`Self::covariance_of`].
+    #[must_use]
+    pub fn covariance_in_use(&self, one: &str, other: &str) -> Option<f64> {
+        let found = self.covariance_of(one, other)?;
+        let place = self.parameters.iter().position(|known| known == one);
+        let allowed = place.filter(|_| one == other).and_then(|place| self.allowance.get(place));
+        Some(found + allowed.map_or(0.0, |deviation| deviation * deviation))
+    }
+
     /// Covariance of two parameters by their key, in the product of their units; none where nothing is stated.
     #[must_use]
     pub fn covariance_of(&self, one: &str, other: &str) -> Option<f64> {
@@ -58,6 +74,8 @@ const KEY: Kind = Kind::Choice(CALIBRATED);
 const KEYS: Kind = Kind::List { of: &KEY, least: 0, most: CALIBRATED.len() };
 const ENTRY: Kind = Kind::unit("product of the units", Range::ANY);
 const ROW: Kind = Kind::List { of: &ENTRY, least: 1, most: CALIBRATED.len() };
+const DEVIATION: Kind = Kind::unit("unit of its key", Range::from(0.0).to(10_000.0));
+const DEVIATIONS: Kind = Kind::List { of: &DEVIATION, least: 0, most: CALIBRATED.len() };
 const MATRIX: Kind = Kind::List { of: &ROW, least: 0, most: CALIBRATED.len() };
 
 /// The keys of `[calibration]`.
@@ -119,10 +137,27 @@ fn declare_result(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {
             "Covariance of the parameters, each in its key's unit.",
             |v| &mut v.calibration.covariance,
         )
+        .optional(
+            "calibration.allowance",
+            DEVIATIONS,
+            "nothing beyond the noise of the readings",
+            "Standard deviations of the parameters from drive to drive, beyond what the readings' noise explains, each in \
+             its key's unit. The estimator's prior adds their squares to the covariance.",
+            |v| &mut v.calibration.allowance,
+        )
 }
 
-/// Reports a covariance that is not one of the parameters.
+/// Reports a covariance or an allowance that is not one of the parameters.
 pub(super) fn check(reading: &mut Reading<'_, VehicleDraft>, found: &Calibration) {
+    let (allowed, parameters) = (found.allowance.len(), found.parameters.len());
+    if allowed != 0 && allowed != parameters {
+        reading.refuse(
+            "calibration.allowance",
+            &format!("{allowed} entries"),
+            Cause::Conflict("not one for each of calibration.parameters".to_owned()),
+            format!("{parameters} entries"),
+        );
+    }
     let (matrix, count) = (&found.covariance, found.parameters.len());
     let square = matrix.len() == count && matrix.iter().all(|row| row.len() == count);
     if matrix.is_empty() || square && is_covariance(matrix) {

@@ -18,6 +18,7 @@ pub(crate) struct VehicleDraft {
     pub(super) wheelbase: f64,
     pub(super) track: [f64; 2],
     pub(super) radius: [f64; 4],
+    pub(super) speed_radius: [Option<f64>; 4],
     pub(super) drive: Drive,
     pub(super) footprint: Footprint,
     pub(super) limits: Limits,
@@ -42,6 +43,7 @@ impl Default for VehicleDraft {
             wheelbase: N,
             track: [N; 2],
             radius: [N; 4],
+            speed_radius: [None; 4],
             drive: Drive::default(),
             footprint: Footprint { length: N, width: N, rear_overhang: N },
             limits: Limits {
@@ -127,7 +129,7 @@ fn declare() -> Schema<VehicleDraft> {
          counter-clockwise.",
         VehicleDraft::default,
     );
-    let schema = declare_sensors(declare_motion(declare_body(schema)));
+    let schema = declare_sensors(declare_motion(declare_speeds(declare_body(schema))));
     calibration::declare(declare_uncertainty(schema))
 }
 
@@ -292,6 +294,24 @@ fn declare_sensors(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {
             "The marker in the body frame.",
             |v| &mut v.reference.marker.yaw,
         )
+}
+
+fn declare_speeds(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {
+    let mut schema = schema.section(
+        "speed_radius",
+        "Radii by which the vehicle computes the wheel speeds that it reports, where these are not \
+         `radius`: a calibration finds other radii, the vehicle goes on with its own.",
+    );
+    for wheel in WHEELS {
+        schema = schema.optional(
+            format!("speed_radius.{}", wheel.name()),
+            LENGTH,
+            "the wheel's radius",
+            format!("Radius behind the reported speed of the wheel {}.", wheel.name()),
+            move |v: &mut VehicleDraft| &mut v.speed_radius[wheel.index()],
+        );
+    }
+    schema
 }
 
 fn declare_encoders(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {

@@ -1,6 +1,7 @@
 //! The payloads, in the order of a sample's way.
 
 mod control;
+mod filter;
 mod motion;
 mod planning;
 mod replay;
@@ -8,6 +9,7 @@ mod supervision;
 mod vehicle;
 
 pub use control::{Actuator, AlterReason, Command, Inhibit, Permit, TrackingPhase, TrackingStop};
+pub use filter::FilterState;
 pub use motion::{
     EstimatorState, FilterKind, Fix, FixVerdict, Odometry, OdometryModel, ResetReason, Restore,
     Travel, WheelStatus, WheelUse,

@@ -1,6 +1,6 @@
 //! From counts to a pose.
 
-use super::{FAR, codes, covariance, finite, known, within};
+use super::{FAR, FilterState, codes, covariance, finite, known, within};
 use crate::layout::layout;
 use crate::{Header, Refusal};
 
@@ -236,6 +236,8 @@ layout! {
         pub wheel_use: [u8; 4],
         /// Sequence of the newest fix judged, 0 for none.
         pub fix_sequence: u64,
+        /// What the filter knows besides, for a later life of the estimator.
+        pub filter_state: FilterState,
     }
 }
 
@@ -255,7 +257,8 @@ impl Odometry {
         known("state", EstimatorState::from_code(self.state))?;
         known("model", OdometryModel::from_code(self.model))?;
         known("reset_reason", ResetReason::from_code(self.reset_reason))?;
-        known("fix_verdict", FixVerdict::from_code(self.fix_verdict))
+        known("fix_verdict", FixVerdict::from_code(self.fix_verdict))?;
+        self.filter_state.check_fields()
     }
 }
 

@@ -63,6 +63,7 @@ fn described(dice: &mut Dice) -> Vehicle {
         steering_rate: rounded(dice.between(0.5, 1.1), 2),
     };
     Vehicle {
+        speed_radius: [None; 4],
         name: format!("car-{:.0}", wheelbase * 100.0),
         wheelbase,
         track_front: track,

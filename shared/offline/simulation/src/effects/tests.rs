@@ -180,6 +180,22 @@ fn a_range_grows_with_the_vehicle() {
 }
 
 #[test]
+fn a_car_that_halts_holds_its_steering_whatever_the_actuator_makes_of_commands() {
+    let effects = Effects::from(&overlay([
+        effect("steering_gain", &[("gain", 1.2)]),
+        effect("steering_backlash", &[("width", 0.05)]),
+    ]));
+    let vehicle = Vehicle::paper_car();
+    let mut car = Simulator::with_effects(&vehicle, &effects, Pose::default(), &Noise::NONE, 0);
+    car.command(0.0, 0.3, 0.2);
+    car.advance(3.0);
+    let rack = car.steering();
+    car.halt(3.0);
+    car.advance(8.0);
+    assert!((car.steering() - rack).abs() < 1e-12 && car.speed() == 0.0);
+}
+
+#[test]
 fn a_live_drive_reads_what_a_whole_one_shows() {
     let effects = Effects::from(&overlay([
         Effect::new("count_loss", Some(Wheel::RearRight), &[("fraction", 0.1)]).unwrap(),

@@ -84,6 +84,7 @@ fn vehicle(root: &Table) -> Vehicle {
         track_front: number(root, "track_front"),
         track_rear: number(root, "track_rear"),
         radius: wheels(table("radius")).map(Option::unwrap),
+        speed_radius: [None; 4],
         drive: match root["drive"].as_str() {
             Some("rear") => Drive::Rear,
             Some("front") => Drive::Front,

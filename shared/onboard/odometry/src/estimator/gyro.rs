@@ -1,6 +1,6 @@
 //! The heading's turn between two looks at a wheel, from a gyro with its own rhythm.
 
-use kerbside_messages::Nanos;
+use kerbside_messages::{FilterState, Nanos};
 
 use crate::wheels::elapsed;
 
@@ -67,6 +67,25 @@ impl GyroIntegral {
     /// Time of that turn \[s\].
     pub(crate) fn time(&self) -> f64 {
         self.since.map_or(0.0, |since| elapsed(self.reached, since))
+    }
+
+    /// Writes it down for a later life.
+    pub(crate) fn save(&self, out: &mut FilterState) {
+        let (rate, stamp) = self.newest.unwrap_or_default();
+        out.has_gyro = u8::from(self.newest.is_some());
+        (out.gyro_rate, out.gyro_stamp) = (rate, stamp);
+        (out.gyro_held, out.gyro_turn, out.gyro_variance) = (self.held, self.turn, self.variance);
+        (out.gyro_reached, out.gyro_since) = (self.reached, self.since.unwrap_or(self.reached));
+    }
+
+    /// Goes on where an earlier life was, unless this one has read the gyro itself.
+    pub(crate) fn load(&mut self, saved: &FilterState) {
+        if self.newest.is_none() && saved.has_gyro == 1 {
+            self.newest = Some((saved.gyro_rate, saved.gyro_stamp));
+            (self.held, self.turn) = (saved.gyro_held, saved.gyro_turn);
+            self.variance = saved.gyro_variance.max(0.0);
+            (self.reached, self.since) = (saved.gyro_reached, Some(saved.gyro_since));
+        }
     }
 
     /// Variance of a reading \[rad^2/s^2\].

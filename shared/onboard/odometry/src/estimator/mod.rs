@@ -1,5 +1,6 @@
 //! From travel to a pose.
 
+mod bits;
 mod fixes;
 mod front;
 mod fused;
@@ -10,6 +11,7 @@ mod kinematics;
 mod model;
 mod odometer;
 mod output;
+mod restore;
 mod twist;
 mod update;
 
@@ -70,8 +72,13 @@ pub struct EstimatorInputs<'a> {
 /// has no pose from a fix: its pose plus what rolled by since; from another counter epoch it is
 /// lost.
 ///
-/// What the fused filter had learnt of the parameters is not restored: it begins with the prior and
-/// twice the covariance of the pose, which bounds what both had in common.
+/// With it comes what the filter knew besides: parameters, their covariance and what they have in
+/// common with the pose, the open block of path, steering and gyro. Where the next travel follows on
+/// the restored one, the estimates are those of a life without end; else what rolled by is a gap.
+/// Not restored are the records to go through again (a fix from before the restart is too old, and a
+/// slip of an axle must be found anew) and the twist, which is zero for 15 ms. Where vehicle or
+/// prior are not those of the earlier life, the filter begins with the prior and twice the
+/// covariance of the pose, which bounds what both had in common.
 ///
 /// A life that is to be restored must not be given an initial pose: that would be published as
 /// valid until the restore arrives.
@@ -192,7 +199,7 @@ impl Estimator {
         let gap = travel.gap == 1 || inputs.missing > 0;
         self.take_epoch(travel);
         if let Some(restore) = inputs.restore {
-            self.take_restore(restore, travel);
+            self.take_restore(restore, travel, gap);
         }
         self.take_aids(travel);
         let brought = self.take_wheels(travel);
@@ -244,54 +251,6 @@ impl Estimator {
         }
         if let Some(fused) = &mut self.fused {
             fused.place(&self.estimate);
-        }
-    }
-
-    /// Takes up what an earlier life knew; what rolled by since is the next increment.
-    fn take_restore(&mut self, restore: &Restore, travel: &Travel) {
-        let known = &restore.odometry;
-        if !self.restorable || known.state != EstimatorState::Valid.code() {
-            return;
-        }
-        self.restorable = false;
-        self.inherit(known);
-        let estimate = Estimate {
-            pose: Pose::new(known.x, known.y, known.yaw),
-            covariance: Matrix3::from_row_slice(&known.covariance),
-        };
-        if known.counter_epoch != travel.counter_epoch {
-            self.jump(estimate, EstimatorState::Lost, ResetReason::CounterReset);
-            self.wheels.apply();
-            return;
-        }
-        self.jump(estimate, EstimatorState::Valid, ResetReason::Restored);
-        if let Some(fused) = &mut self.fused {
-            fused.inherit(&estimate);
-            self.estimate = fused.estimate();
-        }
-        self.wheels.restore(known.travel);
-        self.gap_pending = true;
-        self.rolled = known.header.stamp;
-    }
-
-    /// Counts go on where the earlier life left them.
-    fn inherit(&mut self, known: &Odometry) {
-        self.resets = known.resets;
-        self.distance = known.distance;
-        self.unusable = self.unusable.wrapping_add(known.unusable);
-        if self.verdict == FixVerdict::None {
-            self.verdict = FixVerdict::from_code(known.fix_verdict).unwrap_or(FixVerdict::None);
-            self.fix_sequence = known.fix_sequence;
-        }
-        if let Some(front) = &mut self.front {
-            let record = front.record_mut();
-            record.corrections = record.corrections.wrapping_add(known.corrections);
-            record.gated = record.gated.wrapping_add(known.gated);
-        }
-        if let Some(fused) = &mut self.fused {
-            let statistics = fused.statistics_mut();
-            statistics.corrections = statistics.corrections.wrapping_add(known.corrections);
-            statistics.gated = statistics.gated.wrapping_add(known.gated);
         }
     }
 

@@ -1,7 +1,8 @@
 //! How far each wheel has rolled, and how much of that is in the pose.
 
-use kerbside_messages::{Travel, WheelStatus};
+use kerbside_messages::{FilterState, Travel, WheelStatus};
 
+use super::bits::{bits, of_bits};
 use crate::wheels::WheelScale;
 
 /// What a travel brought.
@@ -64,14 +65,30 @@ impl Odometer {
         *self = Self::new(self.scales, self.needed);
     }
 
-    /// The pose stands for `applied` travels of the present epoch, whatever was taken up so far.
-    pub(crate) fn restore(&mut self, applied: [f64; 4]) {
-        self.applied = applied;
-        self.based = [true; 4];
+    /// Writes down which wheels the pose knows.
+    pub(crate) fn save(&self, out: &mut FilterState) {
+        out.based = bits(self.tracked);
+        out.lost = bits(self.lost);
+        out.read = bits(self.then);
+    }
+
+    /// The pose stands for `applied` travels of the present epoch, whatever was taken up so far. A
+    /// wheel that the earlier life never read begins with its next reading.
+    pub(crate) fn restore(&mut self, applied: [f64; 4], saved: &FilterState) {
+        self.tracked = of_bits(saved.based);
+        self.lost = of_bits(saved.lost);
+        self.then = of_bits(saved.read);
         self.fresh = self.known;
-        self.tracked = [true; 4];
-        self.lost = [false; 4];
-        self.then = [true; 4];
+        for (wheel, applied) in applied.into_iter().enumerate() {
+            if self.tracked[wheel] {
+                (self.applied[wheel], self.based[wheel]) = (applied, true);
+                if !self.known[wheel] {
+                    self.newest[wheel] = applied;
+                }
+            } else {
+                self.applied[wheel] = self.newest[wheel];
+            }
+        }
     }
 
     /// Takes what `travel` says of the wheels. Differences of cumulative travel alone are used, so
@@ -179,10 +196,10 @@ impl Odometer {
     }
 
     /// The travels that the pose stands for: those it took up, and the newest of wheels it does not
-    /// use.
-    pub(crate) fn applied(&self) -> [f64; 4] {
+    /// use. With `every` it uses them all.
+    pub(crate) fn applied(&self, every: bool) -> [f64; 4] {
         let mut all = self.newest;
-        for index in (0..4).filter(|index| self.needed[*index]) {
+        for index in (0..4).filter(|index| every || self.needed[*index]) {
             all[index] = self.applied[index];
         }
         all

@@ -1,6 +1,6 @@
 //! What the estimator says of itself, in every step.
 
-use kerbside_messages::{FilterKind, Header, Odometry, Travel, WheelUse};
+use kerbside_messages::{FilterKind, FilterState, Header, Odometry, Travel, WheelUse};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Estimator, fused};
@@ -46,6 +46,17 @@ impl Estimator {
         })
     }
 
+    /// What a later life needs besides pose, covariance and travel.
+    fn filter_state(&self) -> FilterState {
+        let mut state = FilterState::default();
+        self.wheels.save(&mut state);
+        self.gyro.save(&mut state);
+        if let Some(fused) = &self.fused {
+            fused.save(&mut state);
+        }
+        state
+    }
+
     pub(super) fn write(&self, travel: &Travel, gap: bool, out: &mut Odometry) {
         let stamp = travel.header.stamp;
         let standstill = self.standstill(stamp);
@@ -67,7 +78,7 @@ impl Estimator {
             wheel_ratio: record.wheel_ratio,
             block_ratio: record.block_ratio,
             distance: self.distance,
-            travel: self.wheels.applied(),
+            travel: self.wheels.applied(self.fused.is_some()),
             counter_epoch: travel.counter_epoch,
             resets: self.resets,
             corrections: record.corrections,
@@ -83,6 +94,7 @@ impl Estimator {
             filter: filter_kind(self.settings.filter).code(),
             wheel_use: self.wheel_use().map(WheelUse::code),
             fix_sequence: self.fix_sequence,
+            filter_state: self.filter_state(),
         };
     }
 }

@@ -157,6 +157,7 @@ mod tests {
             metres_per_count: 0.001,
             counter_bits: bits,
             ring_bits: bits.min(32),
+            speed_scale: 1.0,
             top_speed: 1.0,
         })
     }

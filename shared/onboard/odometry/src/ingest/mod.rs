@@ -98,7 +98,8 @@ impl Ingest {
             largest_steering: factor * vehicle.limits.steering + slack,
             largest_yaw_rate: fastest * wheels::largest_curvature(vehicle) + 1.0,
             counters: scales.map(Counter::new),
-            speedometers: scales.map(|scale: WheelScale| Speedometer::new(scale.top_speed)),
+            speedometers: scales
+                .map(|scale: WheelScale| Speedometer::new(scale.top_speed, scale.speed_scale)),
             clock: ClockMap::new(settings),
             sequence: Sequence::default(),
             rate: Rate::new(vehicle.encoders.map_or(0.0, |encoders| encoders.rate)),

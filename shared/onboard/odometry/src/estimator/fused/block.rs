@@ -6,11 +6,13 @@
 //! in common.
 
 use kerbside_geometry::math;
+use kerbside_messages::FilterState;
 
 use super::algebra::{Factor, Projected, System, dot};
 use super::joint::{Gradient, Joint, Values};
-use super::rows::{Measures, ROWS, Row};
+use super::rows::{Measures, PARAMETERS_OF, ROWS, Row};
 use super::setup::Setup;
+use crate::estimator::bits::{bits, of_bits};
 use crate::estimator::increment::Increment;
 
 /// A shorter stretch, as a share of the block, says less than its counts hide.
@@ -88,6 +90,42 @@ impl Block {
         self.way += way;
         self.distance += motion.distance;
         self.turn += motion.turn;
+    }
+
+    /// Writes the stretch down.
+    pub(crate) fn save(&self, out: &mut FilterState) {
+        for (index, sum) in self.sums.iter().enumerate() {
+            out.block_residual[index] = sum.residual;
+            out.block_by_motion[2 * index..2 * index + 2].copy_from_slice(&sum.of);
+            let slopes = sum.by_parameters.map(|(_, slope)| slope);
+            out.block_by_parameters[3 * index..3 * index + 3].copy_from_slice(&slopes);
+            out.block_variance[index] = sum.variance;
+            out.block_reading[index] = sum.reading;
+        }
+        out.block_live = bits(self.sums.map(|sum| sum.live));
+        out.block_used = bits(self.sums.map(|sum| sum.used));
+        (out.block_way, out.block_distance, out.block_turn) = (self.way, self.distance, self.turn);
+        (out.block_records, out.block_chain) = (self.records, self.chain);
+    }
+
+    /// Goes on with a stretch that was written down.
+    pub(crate) fn load(&mut self, saved: &FilterState) {
+        let live: [bool; ROWS] = of_bits(saved.block_live);
+        let used: [bool; ROWS] = of_bits(saved.block_used);
+        self.sums = core::array::from_fn(|index| Sum {
+            live: live[index],
+            used: used[index],
+            residual: saved.block_residual[index],
+            of: core::array::from_fn(|entry| saved.block_by_motion[2 * index + entry]),
+            by_parameters: core::array::from_fn(|entry| {
+                (PARAMETERS_OF[index][entry], saved.block_by_parameters[3 * index + entry])
+            }),
+            variance: saved.block_variance[index],
+            reading: saved.block_reading[index],
+        });
+        (self.way, self.distance, self.turn) =
+            (saved.block_way, saved.block_distance, saved.block_turn);
+        (self.records, self.chain) = (saved.block_records, saved.block_chain);
     }
 
     /// Whether a record of `distance` turns the other way.

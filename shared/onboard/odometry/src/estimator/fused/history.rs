@@ -58,6 +58,11 @@ impl History {
         self.first.max(self.next.saturating_sub(RECORDS as u64))
     }
 
+    /// Number of the next record.
+    pub(crate) fn next(&self) -> u64 {
+        self.next
+    }
+
     pub(crate) fn record(&self, number: u64) -> Option<&Record> {
         let kept = number >= self.oldest() && number < self.next;
         kept.then(|| &self.records[slot(number, RECORDS)])

@@ -1,6 +1,7 @@
 //! Pose and parameters with their joint covariance.
 
 use kerbside_geometry::Pose;
+use kerbside_messages::FilterState;
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector3};
 
 use crate::estimator::increment::{Estimate, Increment, advance};
@@ -70,6 +71,54 @@ impl Joint {
         self.pose = estimate.pose;
         self.pose_pose = estimate.covariance;
         self.pose_parameters = SMatrix::zeros();
+    }
+
+    /// Writes down the parameters and what they have in common with the pose.
+    pub(crate) fn save(&self, out: &mut FilterState) {
+        out.parameters = self.deviation.into();
+        let mut lower = out.parameter_covariance.iter_mut();
+        for row in 0..PARAMETERS {
+            for (column, entry) in (0..=row).zip(&mut lower) {
+                *entry = self.parameters[(row, column)];
+            }
+        }
+        for (row, entries) in out.shared_covariance.chunks_mut(PARAMETERS).enumerate() {
+            for (column, entry) in entries.iter_mut().enumerate() {
+                *entry = self.pose_parameters[(row, column)];
+            }
+        }
+    }
+
+    /// Takes them up again about the present pose; nothing, and false, where that is no covariance.
+    pub(crate) fn load(&mut self, saved: &FilterState) -> bool {
+        let mut loaded = Self { deviation: saved.parameters.into(), ..*self };
+        let mut lower = saved.parameter_covariance.iter();
+        for row in 0..PARAMETERS {
+            for (column, entry) in (0..=row).zip(&mut lower) {
+                loaded.parameters[(row, column)] = *entry;
+                loaded.parameters[(column, row)] = *entry;
+            }
+        }
+        loaded.pose_parameters = SMatrix::from_row_slice(&saved.shared_covariance);
+        let good = loaded.is_covariance();
+        if good {
+            *self = loaded;
+        }
+        good
+    }
+
+    /// Finite, and no covariance beyond what its two variances allow.
+    fn is_covariance(&self) -> bool {
+        let pose = self.pose_pose.diagonal();
+        let own = self.parameters.diagonal();
+        let fits = |entry: f64, one: f64, other: f64| {
+            one >= 0.0 && other >= 0.0 && entry * entry <= one * other * (1.0 + 1e-6)
+        };
+        let all = 0..PARAMETERS;
+        all.clone().all(|row| {
+            all.clone().all(|column| fits(self.parameters[(row, column)], own[row], own[column]))
+                && (0..3).all(|axis| fits(self.pose_parameters[(axis, row)], pose[axis], own[row]))
+        })
     }
 
     pub(crate) fn estimate(&self) -> Estimate {

@@ -20,8 +20,9 @@ mod setup;
 mod state;
 mod steering;
 
-use kerbside_messages::{Fix, Nanos, Travel, WheelUse};
+use kerbside_messages::{FilterState, Fix, Nanos, Odometry, Travel, WheelUse};
 
+use super::bits::{bits, of_bits};
 use super::increment::{Estimate, Increment};
 use crate::parameters::{Parameter, ParameterEstimate};
 use axles::Axle;
@@ -130,10 +131,29 @@ impl Fused {
         self.window = None;
     }
 
-    /// A pose that an earlier life knew. What it had in common with the parameters is not known any
-    /// more; twice its covariance bounds that (the covariance of a sum is at most twice the sum of
-    /// the covariances).
-    pub(crate) fn inherit(&mut self, estimate: &Estimate) {
+    /// Writes down what a later life needs besides the pose.
+    pub(crate) fn save(&self, out: &mut FilterState) {
+        self.state.save(out);
+        self.steering.save(out);
+        out.distrusted = bits(self.distrusted);
+        out.basis = self.setup.basis;
+    }
+
+    /// What an earlier life knew. Where that was of another vehicle or prior, only its pose, and
+    /// what it had in common with the parameters is not known any more; twice its covariance bounds
+    /// that (the covariance of a sum is at most twice the sum of the covariances).
+    pub(crate) fn inherit(&mut self, estimate: &Estimate, known: &Odometry) {
+        let saved = &known.filter_state;
+        self.place(estimate);
+        if saved.basis == self.setup.basis && self.state.load(&self.setup, saved) {
+            self.state.block.first = self.history.next();
+            self.steering.load(saved, known.steering);
+            self.distrusted = of_bits(saved.distrusted);
+            self.statistics.wheel_ratio = known.wheel_ratio;
+            self.statistics.block_ratio = known.block_ratio;
+            return;
+        }
+        self.state.time = known.header.stamp;
         let uncertain = self.setup.prior.covariance.diagonal().max() > 0.0;
         let factor = if uncertain { 2.0 } else { 1.0 };
         self.place(&Estimate { covariance: factor * estimate.covariance, ..*estimate });

@@ -13,6 +13,21 @@ pub(crate) const STEERING: usize = 4;
 pub(crate) const GYRO: usize = 5;
 pub(crate) const ROWS: usize = 6;
 
+/// By which parameters [`Row::by_parameters`] derives each row.
+pub(crate) const PARAMETERS_OF: [[usize; 3]; ROWS] = {
+    let (front, rear) = (Parameter::TrackFront.index(), Parameter::TrackRear.index());
+    let (base, zero) = (Parameter::Wheelbase.index(), Parameter::SteeringZero.index());
+    let bias = Parameter::GyroBias.index();
+    [
+        [0, front, base],
+        [1, front, base],
+        [2, rear, 2],
+        [3, rear, 3],
+        [zero, base, zero],
+        [bias, bias, bias],
+    ]
+};
+
 /// A rear wheel that the vehicle turns about still has this share of the way of the virtual centre
 /// wheel in its noise.
 const LEAST_WAY: f64 = 0.1;
@@ -200,4 +215,32 @@ fn sensitivity(rows: &[Row; ROWS], covariance: &Matrix2<f64>, turn: f64) -> Sens
         }
     }
     by_parameters
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_row_derives_by_its_parameters() {
+        let (vehicle, settings) = (kerbside_geometry::Vehicle::paper_car(), Default::default());
+        let prior = crate::ParameterPrior::calibrated(&vehicle);
+        let sensors = crate::Sensors {
+            wheels: [true; 4],
+            signal: crate::WheelSignal::Speeds,
+            steering: true,
+            gyro: true,
+        };
+        let scales = crate::wheels::scales(&vehicle, &sensors).unwrap();
+        let setup = Setup::new(&vehicle, &sensors, &settings, &prior, &scales);
+        let measures = Measures::new(&setup, &Values::zeros());
+        let centre = (0.8, 0.6);
+        let mut rows: Vec<Row> =
+            (0..4).map(|wheel| measures.wheel(wheel, 0.1, centre, 1e-6)).collect();
+        rows.push(measures.steering(centre, 1e-6));
+        rows.push(measures.gyro(0.1, 1e-6, 0.1));
+        for (row, expected) in rows.iter().zip(PARAMETERS_OF) {
+            assert_eq!(row.by_parameters(0.1).map(|(parameter, _)| parameter), expected);
+        }
+    }
 }

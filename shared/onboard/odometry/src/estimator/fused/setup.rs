@@ -53,6 +53,8 @@ pub(crate) struct Setup {
     /// Squared Mahalanobis length beyond which a fix is refused.
     pub(crate) gate: f64,
     pub(crate) prior: ParameterPrior,
+    /// Tells this vehicle and prior from others: what was learnt is deviations from these.
+    pub(crate) basis: u64,
     /// What change adds to the parameters' variances per metre.
     drift: Values,
     /// And to that of the gyro's bias per second.
@@ -91,6 +93,7 @@ impl Setup {
             gate: settings.gate,
             drift,
             bias_drift: if uncertain[bias] > 0.0 { BIAS_WALK * BIAS_WALK } else { 0.0 },
+            basis: basis(vehicle, prior, scales),
             prior: prior.clone(),
         }
     }
@@ -101,6 +104,19 @@ impl Setup {
         drift[Parameter::GyroBias.index()] = self.bias_drift * time;
         drift
     }
+}
+
+/// A number that other measures or another prior do not share (FNV-1a over their bits); never 0.
+fn basis(vehicle: &Vehicle, prior: &ParameterPrior, scales: &[WheelScale; 4]) -> u64 {
+    let measures = [vehicle.wheelbase, vehicle.track_front, vehicle.track_rear];
+    let counts = scales.iter().map(|scale| scale.metres_per_count);
+    let numbers = measures.into_iter().chain(vehicle.radius).chain(counts);
+    let all = numbers.chain(prior.covariance.iter().copied());
+    let bytes = all.flat_map(|number| number.to_bits().to_le_bytes());
+    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    });
+    hash.max(1)
 }
 
 /// Random part of each wheel's travel \[m/sqrt(m)\]: the prior's, else the file's, else the

@@ -1,7 +1,7 @@
 //! The fused filter's whole state, and how a record carries it on: a pure function, gone through
 //! again wherever the past turns out to have been otherwise.
 
-use kerbside_messages::Nanos;
+use kerbside_messages::{FilterState, Nanos};
 
 use super::block::{Block, Verdict};
 use super::fix::{Sighting, Surprise};
@@ -83,6 +83,32 @@ impl State {
             time: 0,
             judged: None,
         }
+    }
+
+    /// Writes down all but the pose.
+    pub(crate) fn save(&self, out: &mut FilterState) {
+        self.joint.save(out);
+        self.block.save(out);
+        (out.pending, out.course, out.seen) = (self.pending, self.course, self.seen);
+        out.owed_travel = self.owed.map(|owed| owed.travel);
+        out.owed_way = self.owed.map(|owed| owed.way);
+        out.time = self.time;
+    }
+
+    /// Takes it up again about the present pose; nothing, and false, where it is no covariance.
+    pub(crate) fn load(&mut self, setup: &Setup, saved: &FilterState) -> bool {
+        if !self.joint.load(saved) {
+            return false;
+        }
+        self.measures = Measures::new(setup, &self.joint.deviation);
+        self.block.load(saved);
+        (self.pending, self.course, self.seen) = (saved.pending, saved.course, saved.seen);
+        self.owed = core::array::from_fn(|wheel| Owed {
+            travel: saved.owed_travel[wheel],
+            way: saved.owed_way[wheel],
+        });
+        self.time = saved.time;
+        true
     }
 
     pub(crate) fn measures(&self) -> &Measures {

@@ -1,7 +1,7 @@
 //! The steering angle that a reading's way is taken to have had.
 
 use kerbside_geometry::math;
-use kerbside_messages::{Nanos, Travel};
+use kerbside_messages::{FilterState, Nanos, Travel};
 
 use super::record::Steered;
 use crate::wheels::elapsed;
@@ -23,6 +23,22 @@ pub(crate) struct SteeringTrack {
 }
 
 impl SteeringTrack {
+    /// Writes down what the newest angle, which every odometry carries, does not say.
+    pub(crate) fn save(&self, out: &mut FilterState) {
+        out.has_steering = u8::from(self.newest.is_some());
+        (out.steering_before, out.steering_way) = (self.before, self.way);
+        (out.steering_stamp, out.steering_run) = (self.stamp, self.run);
+    }
+
+    /// Goes on from `newest`, unless this life has read an angle itself.
+    pub(crate) fn load(&mut self, saved: &FilterState, newest: f64) {
+        if self.newest.is_none() && saved.has_steering == 1 {
+            self.newest = Some(newest);
+            (self.before, self.way) = (saved.steering_before, saved.steering_way);
+            (self.stamp, self.run) = (saved.steering_stamp, saved.steering_run);
+        }
+    }
+
     pub(crate) fn take(&mut self, travel: &Travel) {
         self.run = if travel.steering_is_new == 1 { self.run.saturating_add(1) } else { 0 };
         if travel.has_steering == 1 && (travel.steering_is_new == 1 || self.newest.is_none()) {
