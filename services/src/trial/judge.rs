@@ -3,6 +3,8 @@
 use core::f64::consts::{PI, TAU};
 use std::collections::BTreeSet;
 
+use kerbside_geometry::math;
+
 use super::answer::Answer;
 use super::label::{Label, Truth};
 
@@ -120,7 +122,7 @@ fn scale(truth: &Truth, name: &str, value: f64) -> f64 {
             let away = ["front", "rear"].map(|name| (of(name) - neutral(name)).abs());
             away[0].max(away[1])
         }
-        ("reference_marker", "x" | "y") => of("x").hypot(of("y")),
+        ("reference_marker", "x" | "y") => math::hypot(of("x"), of("y")),
         _ => (value - neutral(name)).abs(),
     };
     if scale > 0.0 { scale } else { 1.0 }

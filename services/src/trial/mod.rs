@@ -37,6 +37,7 @@ use sha2::{Digest, Sha256};
 pub use plant::Simulated;
 
 use crate::exit::{Exit, Failure};
+use crate::figures::Figure;
 use crate::output;
 use answer::Answer;
 use judge::Row;
@@ -140,7 +141,7 @@ pub fn run_with(args: &TrialArgs, program: &Path) -> Result<Exit, Failure> {
         return unfinished(&out, "sealed");
     };
     let root = commit(&sealed, &out)?;
-    say(args, &format!("{} labels sealed, commitment {root}", sealed.len()));
+    say(args, &format!("{} labels sealed\ncommitment  {root}", sealed.len()));
     let bar = bar(drawn.len(), "{bar:30} {pos}/{len} diagnosed, {elapsed}");
     let done = sitting::each(&drawn, &late, &|one| {
         diagnose(args, one, &out, program)?;
@@ -156,7 +157,7 @@ pub fn run_with(args: &TrialArgs, program: &Path) -> Result<Exit, Failure> {
     let facts = print::Facts { args, root: &root, program: &hash, out: &out, resolved };
     kerbside_runtime::end_on_broken_pipe();
     print::tell(&score, &facts);
-    let passed = score.figures().iter().all(crate::figures::Figure::passed);
+    let passed = score.figures().iter().all(Figure::passed);
     Ok(if passed { Exit::Good } else { Exit::Bad })
 }
 

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::TrialArgs;
 use super::judge::Row;
 use super::score::{Score, Share, size_class};
+use crate::figures::{Figure, Limit};
 use crate::tables;
 
 /// What is told besides the score.
@@ -28,7 +29,7 @@ pub struct Facts<'a> {
 /// Prints everything.
 pub fn tell(score: &Score, facts: &Facts<'_>) {
     let figures = score.figures();
-    let passed = figures.iter().all(crate::figures::Figure::passed);
+    let passed = figures.iter().all(Figure::passed);
     if facts.args.json {
         println!("{}", document(score, facts, passed));
         return;
@@ -40,21 +41,14 @@ pub fn tell(score: &Score, facts: &Facts<'_>) {
     println!("{}", classes("single effects, by sensors", &score.by(&["single"], sensors)));
     println!("{}", calibration(score));
     println!("{}", against(score));
-    for figure in &figures {
-        println!("{figure}");
-    }
+    println!("{}", held(&figures));
     if facts.resolved.of > 0 {
         let Share { right, of } = facts.resolved;
         println!("ambiguous answers that the suggested manoeuvre resolved: {right} of {of}");
     }
-    println!(
-        "{} cases, seed {}, plant {}, commitment {}",
-        score.rows.len(),
-        facts.args.seed,
-        facts.args.plant.name(),
-        facts.root
-    );
-    println!("answers  {}", facts.out.display());
+    let (cases, seed, plant) = (score.rows.len(), facts.args.seed, facts.args.plant.name());
+    println!("{cases} cases, seed {seed}, plant {plant}\ncommitment  {}", facts.root);
+    println!("answers     {}", facts.out.display());
 }
 
 fn percent(share: Share) -> String {
@@ -133,6 +127,26 @@ fn against(score: &Score) -> Table {
     table
 }
 
+/// The figures that the trial holds itself against.
+fn held(figures: &[Figure]) -> Table {
+    let mut table = tables::figures(&["held against", "is", "95 %", "limit", ""], &[1, 3]);
+    for figure in figures {
+        let interval = figure.interval.map(|(low, high)| format!("{low:.2}..{high:.2}"));
+        let limit = match figure.limit {
+            Limit::AtMost(limit) => format!("<= {limit}"),
+            Limit::AtLeast(limit) => format!(">= {limit}"),
+        };
+        table.add_row([
+            figure.name.clone(),
+            format!("{:.3}", figure.value),
+            interval.unwrap_or_default(),
+            limit,
+            if figure.passed() { "ok" } else { "missed" }.to_owned(),
+        ]);
+    }
+    table
+}
+
 /// How often one of the effects, picked blindly, is right.
 #[allow(clippy::cast_precision_loss)] // A few dozen.
 fn chance() -> f64 {
@@ -189,7 +203,7 @@ fn document(score: &Score, facts: &Facts<'_>, passed: bool) -> Value {
         "version": env!("CARGO_PKG_VERSION"),
         "seed": facts.args.seed,
         "passed": passed,
-        "figures": score.figures().iter().map(crate::figures::Figure::as_json).collect::<Vec<_>>(),
+        "figures": score.figures().iter().map(Figure::as_json).collect::<Vec<_>>(),
         "cases": score.rows.len(),
         "plant": facts.args.plant.name(),
         "commitment": facts.root,

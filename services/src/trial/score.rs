@@ -2,6 +2,7 @@
 
 use super::judge::Row;
 use super::rivals::RIVALS;
+use super::sitting::AT_ONCE;
 use crate::figures::Figure;
 
 /// From this size d on an effect is to be found.
@@ -195,10 +196,10 @@ impl Score {
         words.into_iter().map(shares).collect()
     }
 
-    /// Mean time of a diagnosis \[s\].
+    /// Time per case on all cores \[s\]: so many diagnoses share them, and each has its part of the time that it took.
     #[must_use]
     pub fn seconds(&self) -> f64 {
-        mean(self.rows.iter().filter_map(|row| row.seconds))
+        mean(self.rows.iter().filter_map(|row| row.seconds)) / real(AT_ONCE)
     }
 
     /// What the trial holds itself against.

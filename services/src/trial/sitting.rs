@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -16,8 +16,6 @@ use crate::output;
 pub const AT_ONCE: usize = 2;
 /// A diagnosis that takes longer is ended, and wrong \[s\].
 const LONGEST: u64 = 300;
-/// Between two looks at a process \[ms\].
-const LOOK: u64 = 20;
 /// Why there is no diagnosis.
 const FAILURE: &str = "failure.txt";
 const DIAGNOSIS: &str = "diagnosis.json";
@@ -44,7 +42,7 @@ pub fn diagnose(program: &Path, data: &Path, out: &Path) -> Result<Outcome, Fail
     output::make(out)?;
     let log = out.join("log.txt");
     let errors = fs::File::create(&log).map_err(Failure::internal)?;
-    let mut child = Command::new(program)
+    let child = Command::new(program)
         .arg("diagnose")
         .arg(data)
         .arg("--out")
@@ -55,7 +53,7 @@ pub fn diagnose(program: &Path, data: &Path, out: &Path) -> Result<Outcome, Fail
         .stderr(errors)
         .spawn()
         .map_err(Failure::internal)?;
-    if let Some(why) = wait(&mut child)? {
+    if let Some(why) = wait(child)? {
         let told = fs::read_to_string(&log).unwrap_or_default();
         let last = told.lines().rfind(|line| !line.trim().is_empty()).unwrap_or_default();
         // What it may have written before it failed is no answer.
@@ -67,19 +65,24 @@ pub fn diagnose(program: &Path, data: &Path, out: &Path) -> Result<Outcome, Fail
 }
 
 /// Waits for a process; why it is no success, where it is none.
-fn wait(child: &mut Child) -> Result<Option<String>, Failure> {
-    let begin = Instant::now();
-    loop {
-        if let Some(status) = child.try_wait().map_err(Failure::internal)? {
-            return Ok((!status.success()).then(|| status.to_string()));
-        }
-        if begin.elapsed() > Duration::from_secs(LONGEST) {
-            let _ = child.kill();
-            let _ = child.wait();
-            return Ok(Some(format!("ended after {LONGEST} s")));
-        }
-        std::thread::sleep(Duration::from_millis(LOOK));
+fn wait(mut child: Child) -> Result<Option<String>, Failure> {
+    let pid = i32::try_from(child.id()).ok().and_then(rustix::process::Pid::from_raw);
+    let (tell, told) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        // Nobody listens any more where the trial itself failed.
+        let _ = tell.send(child.wait());
+    });
+    let ended = told.recv_timeout(Duration::from_secs(LONGEST));
+    if let Ok(status) = ended {
+        let status = status.map_err(Failure::internal)?;
+        return Ok((!status.success()).then(|| status.to_string()));
     }
+    if let Some(pid) = pid {
+        // It may have ended by itself just now.
+        let _ = rustix::process::kill_process(pid, rustix::process::Signal::KILL);
+        let _ = told.recv();
+    }
+    Ok(Some(format!("ended after {LONGEST} s")))
 }
 
 /// Does `work` on every job, [`AT_ONCE`] at a time, until all are done, one fails or `enough` says so; whether all are done.

@@ -264,3 +264,53 @@ fn lacking(case: &Case, index: usize) -> Case {
     case.specification.habits.retain(|habit| habit.id != gone.id);
     case
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trial::Simulated;
+    use kerbside_proving_ground::cases::{Kind, Request};
+
+    fn case(id: &'static str, share: f64) -> Case {
+        let kind = Kind::Single;
+        let request =
+            Request { ids: vec![id], share: Some(share), duration: 8.0, ..Request::new(kind) };
+        (0..50).find_map(|seed| Case::of(seed, &request)).unwrap()
+    }
+
+    /// The only size.
+    fn of(case: &Case) -> f64 {
+        sizes(case, &Simulated)[0]
+    }
+
+    #[test]
+    fn size_grows_with_the_effect_and_stays_below_what_all_rows_could_say() {
+        let case = case("gyro_bias", 0.1);
+        let mut twice = case.clone();
+        let bias = twice.specification.effects[0].get("bias");
+        twice.specification.effects[0].values[0].1 = 2.0 * bias;
+        let (one, two) = (of(&case), of(&twice));
+        assert!((two / one - 2.0).abs() < 0.05, "{one} {two}");
+        let rows: usize = case.specification.runs.iter().map(|plan| plan.stamps.gyro.len()).sum();
+        let most = bias.abs() / case.specification.floor.gyro * (rows as f64).sqrt();
+        assert!(one > 0.02 * most && one < most, "{one} of at most {most}");
+    }
+
+    #[test]
+    fn what_the_description_may_be_wrong_by_hides_an_effect() {
+        let case = case("gyro_gain", 0.3);
+        let mut sure = case.clone();
+        sure.specification.uncertainty.fields.clear();
+        sure.specification.uncertainty.effects.clear();
+        assert!(of(&case) < of(&sure), "{} {}", of(&case), of(&sure));
+    }
+
+    #[test]
+    fn a_case_in_good_order_has_no_size_and_an_effect_that_acts_nowhere_none_to_speak_of() {
+        assert!(sizes(&Case::draw(3, Kind::Null), &Simulated).is_empty());
+        let mut case = case("floor_patch", 0.3);
+        let effect = &mut case.specification.effects[0];
+        effect.values.iter_mut().filter(|known| known.0 == "x").for_each(|known| known.1 = 1e3);
+        assert!(of(&case) < 0.01, "{}", of(&case));
+    }
+}
