@@ -37,7 +37,7 @@ pub fn tell(score: &Score, facts: &Facts<'_>) {
     println!("{}", kinds(score));
     println!("{}", classes("single effects, by size d", &score.by(&["single"], size_class)));
     println!("{}", classes("pairs, by size d of the weaker", &score.by(&["pair"], size_class)));
-    println!("{}", classes("single effects", &score.by(&["single"], |row| effect(row))));
+    println!("{}", classes("single effects", &score.by(&["single"], effect)));
     println!("{}", classes("single effects, by sensors", &score.by(&["single"], sensors)));
     println!("{}", calibration(score));
     println!("{}", against(score));
@@ -224,7 +224,7 @@ fn document(score: &Score, facts: &Facts<'_>, passed: bool) -> Value {
         "regret_median": score.regret(),
         "resolved_by_next": as_json(facts.resolved),
         "baselines": baselines,
-        "by_effect": by(score.by(&["single"], |row| effect(row))),
+        "by_effect": by(score.by(&["single"], effect)),
         "by_size": by(score.by(&["single"], size_class)),
         "by_size_pairs": by(score.by(&["pair"], size_class)),
         "by_sensors": by(score.by(&["single"], sensors)),

@@ -129,7 +129,7 @@ impl<'a> Gauge<'a> {
             };
             let mut all: Vec<Channels> =
                 (1..=SEEDS).map(|seed| minus(&noisy(seed), silent)).collect();
-            all.iter_mut().for_each(|noise| counted_from_start(noise));
+            all.iter_mut().for_each(counted_from_start);
             noises.extend(all);
         }
         let colour =
