@@ -34,6 +34,7 @@ pub mod simulate;
 pub mod supervisor;
 pub mod tables;
 pub mod tracker;
+pub mod trial;
 pub mod vehicle;
 
 pub use commands::{Cli, asks_for_json, run};

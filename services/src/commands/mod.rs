@@ -21,6 +21,7 @@ use crate::replay::ReplayArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::service::{Service, ServiceArgs};
 use crate::simulate::SimulateArgs;
+use crate::trial::TrialArgs;
 use crate::vehicle::VehicleArgs;
 use crate::{
     actuation, estimator, ingest, interface, logging, park, planner, recorder, tracker, vehicle,
@@ -88,6 +89,9 @@ enum Verb {
     /// Repeat the paper's experiments on the proving ground, and hold them against what they are to show.
     #[command(after_help = "Example: kerbside reproduce --trials 400 --out /tmp/paper")]
     Reproduce(ReproduceArgs),
+    /// Diagnose cases with secret causes, then open them and say how often that was right.
+    #[command(after_help = "Example: kerbside trial --cases 60 --seed 1 --out /tmp/trial")]
+    Trial(TrialArgs),
     /// Compare ways of doing the same, side by side.
     #[command(subcommand, after_help = "Example: kerbside compare filters --trials 100")]
     Compare(CompareVerb),
@@ -169,6 +173,10 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
         Verb::Reproduce(args) => {
             logging::start("reproduce", level.unwrap_or("warn"), false);
             crate::reproduce::run(args)
+        }
+        Verb::Trial(args) => {
+            logging::start("trial", level.unwrap_or("warn"), false);
+            crate::trial::run(args)
         }
         Verb::Compare(verb) => {
             logging::start("compare", level.unwrap_or("warn"), false);

@@ -99,6 +99,15 @@ impl Trajectory {
         &self.knots
     }
 
+    /// Lets `change` alter every knot, in the order of time: a drive that is disturbed on its way. Times stay as they are.
+    pub fn alter(&mut self, mut change: impl FnMut(&mut Knot)) {
+        for knot in &mut self.knots {
+            let time = knot.time;
+            change(knot);
+            knot.time = time;
+        }
+    }
+
     /// The true state at `t` \[s\]: at the start before 0, at the end after it; all zero in an empty
     /// trajectory.
     #[must_use]
