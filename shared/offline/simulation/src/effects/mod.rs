@@ -1,6 +1,6 @@
 //! The effects that can be added to the nominal vehicle: one file each.
 //!
-//! An effect's file says what it means and how it alters the [`Plant`], the description that every
+//! An effect's file says what it means and how it alters the plant, the description that every
 //! station of the simulator works by. To add one: write its file and name it here, in `LIBRARY`;
 //! its parameters, its overlay, its range in a search and its place in the simulation follow.
 //!
@@ -55,9 +55,6 @@ pub use definition::{Definition, Link, ParameterDefinition, Scaling};
 pub use overlay::{Effect, Overlay, OverlayError};
 pub use parameter::Parameter;
 pub use values::Effects;
-
-#[cfg(doc)]
-use crate::plant::Plant;
 
 /// Every effect, in the order of cause: the one place to add the next.
 const LIBRARY: &[&Definition] = &[
