@@ -59,7 +59,7 @@ impl Sealed {
             .into()
     }
 
-    /// Keeps it in `folder`, which only this user can read.
+    /// Keeps it in `folder`, which is no part of what a diagnosis is given.
     ///
     /// # Errors
     /// [`Failure`] where it cannot be written.

@@ -1,7 +1,7 @@
 //! Every listed effect as something that can be fitted: coordinates, their priors and where a search begins.
 
 use kerbside_geometry::{Vehicle, WHEELS, math};
-use kerbside_simulation::effects::{Definition, library};
+use kerbside_simulation::effects::{Definition, ParameterDefinition, library};
 use kerbside_simulation::{Effects, Parameter};
 
 use crate::generic::Extent;
@@ -53,100 +53,100 @@ pub(crate) fn candidates(vehicle: &Vehicle, extent: &Extent) -> Vec<Candidate> {
 }
 
 fn of(definition: &'static Definition, vehicle: &Vehicle, extent: &Extent) -> Vec<Candidate> {
-    let range = |name: &str| {
-        let parameter = definition.parameters.iter().find(|p| p.name == name);
-        parameter.map_or((0.0, 1.0), |p| p.range_for(vehicle))
-    };
-    let plain = |coordinates: Vec<Coordinate>, starts: Vec<Vec<f64>>| {
-        vec![Candidate { definition, wheel: None, coordinates, starts }]
-    };
-    let find = |name: &str| Parameter::find(definition.id, name);
+    let one =
+        |(coordinates, starts): Fitted| Candidate { definition, wheel: None, coordinates, starts };
     match definition.id {
-        "acceleration_limit" | "steering_rate_limit" => {
-            let Some(parameter) = find("limit") else { return Vec::new() };
-            let limits = &vehicle.limits;
-            let nominal = if definition.id == "acceleration_limit" {
-                limits.acceleration
-            } else {
-                limits.steering_rate
-            };
-            let low = math::ln(0.5 * range("limit").0 / nominal);
-            let meaning = Meaning::Limit(parameter, nominal);
-            let coordinate = Coordinate {
-                meaning,
-                neutral: 0.0,
-                deviation: 1.0,
-                centre: -0.8,
-                low,
-                high: -1e-3,
-            };
-            plain(vec![coordinate], vec![vec![-0.1], vec![-0.35], vec![-0.8], vec![-1.5]])
+        "acceleration_limit" => {
+            limit(definition, vehicle, vehicle.limits.acceleration).map(one).into_iter().collect()
         }
-        "floor_slope" => {
-            let high = range("rate").1;
-            let axis = |across| Coordinate {
-                meaning: Meaning::Slope { across },
-                neutral: 0.0,
-                deviation: 0.5 * high,
-                centre: 0.0,
-                low: -BEYOND * high,
-                high: BEYOND * high,
-            };
-            plain(vec![axis(false), axis(true)], vec![vec![0.0, 0.0]])
+        "steering_rate_limit" => {
+            limit(definition, vehicle, vehicle.limits.steering_rate).map(one).into_iter().collect()
         }
+        "floor_slope" => vec![one(slope(range(definition, "rate", vehicle).1))],
+        "floor_patch" => patch(definition, vehicle, extent).map(one).into_iter().collect(),
         "count_loss" => (0..4)
             .filter_map(|wheel| {
-                let high = range("fraction").1;
+                let high = range(definition, "fraction", vehicle).1;
                 let coordinate =
                     one_sided(Parameter::find_at("count_loss", "fraction", WHEELS[wheel])?, high);
                 let (coordinates, starts) = (vec![coordinate], vec![vec![0.1 * high]]);
                 Some(Candidate { definition, wheel: Some(wheel), coordinates, starts })
             })
             .collect(),
-        // Its place comes from the map.
-        "floor_patch" => {
-            let (Some(x), Some(y), Some(radius), Some(ratio)) =
-                (find("x"), find("y"), find("radius"), find("ratio"))
-            else {
-                return Vec::new();
-            };
-            let size = vehicle.wheelbase;
-            let [x0, y0, x1, y1] = extent.place;
-            let free = |parameter, low: f64, high: f64| Coordinate {
-                meaning: Meaning::Plain(parameter),
-                neutral: 0.0,
-                deviation: (0.3 * (high - low)).max(size),
-                centre: 0.5 * (low + high),
-                low: low - 2.0 * size,
-                high: high + 2.0 * size,
-            };
-            let radius = Coordinate {
-                deviation: 2.0 * size,
-                centre: size,
-                low: 0.1 * size,
-                high: 8.0 * size,
-                ..free(radius, 0.0, size)
-            };
-            let ratio = one_sided(ratio, range("ratio").1);
-            plain(vec![free(x, x0, x1), free(y, y0, y1), radius, ratio], Vec::new())
-        }
-        _ => {
-            let coordinates: Vec<Coordinate> = definition
-                .parameters
-                .iter()
-                .filter_map(|p| {
-                    let (parameter, (low, high)) = (find(p.name)?, p.range_for(vehicle));
-                    Some(if low >= p.neutral {
-                        one_sided(parameter, high)
-                    } else {
-                        two_sided(parameter, p.neutral, low, high)
-                    })
-                })
-                .collect();
-            let starts = starts(&coordinates);
-            plain(coordinates, starts)
-        }
+        _ => vec![one(ordinary(definition, vehicle))],
     }
+}
+
+/// Coordinates and where a search begins.
+type Fitted = (Vec<Coordinate>, Vec<Vec<f64>>);
+
+/// What a sane search covers of a parameter.
+fn range(definition: &Definition, name: &str, vehicle: &Vehicle) -> (f64, f64) {
+    let parameter = definition.parameters.iter().find(|p| p.name == name);
+    parameter.map_or((0.0, 1.0), |p| p.range_for(vehicle))
+}
+
+/// A limit that lowers the nominal one.
+fn limit(definition: &Definition, vehicle: &Vehicle, nominal: f64) -> Option<Fitted> {
+    let low = math::ln(0.5 * range(definition, "limit", vehicle).0 / nominal);
+    let meaning = Meaning::Limit(Parameter::find(definition.id, "limit")?, nominal);
+    let coordinate =
+        Coordinate { meaning, neutral: 0.0, deviation: 1.0, centre: -0.8, low, high: -1e-3 };
+    Some((vec![coordinate], vec![vec![-0.1], vec![-0.35], vec![-0.8], vec![-1.5]]))
+}
+
+/// A vector in the reference frame.
+fn slope(high: f64) -> Fitted {
+    let axis = |across| Coordinate {
+        meaning: Meaning::Slope { across },
+        neutral: 0.0,
+        deviation: 0.5 * high,
+        centre: 0.0,
+        low: -BEYOND * high,
+        high: BEYOND * high,
+    };
+    (vec![axis(false), axis(true)], vec![vec![0.0, 0.0]])
+}
+
+/// A disc; where a search begins comes from the map.
+fn patch(definition: &Definition, vehicle: &Vehicle, extent: &Extent) -> Option<Fitted> {
+    let find = |name: &str| Parameter::find(definition.id, name);
+    let size = vehicle.wheelbase;
+    let [x0, y0, x1, y1] = extent.place;
+    let free = |parameter, low: f64, high: f64| Coordinate {
+        meaning: Meaning::Plain(parameter),
+        neutral: 0.0,
+        deviation: (0.3 * (high - low)).max(size),
+        centre: 0.5 * (low + high),
+        low: low - 2.0 * size,
+        high: high + 2.0 * size,
+    };
+    let radius = Coordinate {
+        deviation: 2.0 * size,
+        centre: size,
+        low: 0.1 * size,
+        high: 8.0 * size,
+        ..free(find("radius")?, 0.0, size)
+    };
+    let ratio = one_sided(find("ratio")?, range(definition, "ratio", vehicle).1);
+    Some((vec![free(find("x")?, x0, x1), free(find("y")?, y0, y1), radius, ratio], Vec::new()))
+}
+
+/// Every parameter as it is.
+fn ordinary(definition: &Definition, vehicle: &Vehicle) -> Fitted {
+    let coordinate = |p: &ParameterDefinition| {
+        let (parameter, (low, high)) =
+            (Parameter::find(definition.id, p.name)?, p.range_for(vehicle));
+        Some(if low >= p.neutral {
+            one_sided(parameter, high)
+        } else {
+            two_sided(parameter, p.neutral, low, high)
+        })
+    };
+    let coordinates: Vec<Coordinate> =
+        definition.parameters.iter().filter_map(coordinate).collect();
+    let starts = starts(&coordinates);
+    (coordinates, starts)
 }
 
 fn one_sided(parameter: Parameter, high: f64) -> Coordinate {

@@ -1,6 +1,8 @@
 //! The answer follows from the data: effects put in are found with their sizes, nothing is found where nothing is,
 //! what is not listed is said to be unknown, and mistakes are told from physics.
 
+#![allow(clippy::expect_used, clippy::panic)]
+
 mod support;
 
 use kerbside_diagnosis::{Case, Diagnosis, DiagnosisError, Settings, Verdict, Wheels, diagnose};

@@ -12,16 +12,16 @@ use rand_pcg::Pcg64Mcg;
 
 /// Which sensors a case has.
 #[derive(Clone, Copy)]
-pub struct Sensors {
-    pub steering: bool,
-    pub gyro: bool,
-    pub yaw: bool,
+pub(crate) struct Sensors {
+    pub(crate) steering: bool,
+    pub(crate) gyro: bool,
+    pub(crate) yaw: bool,
 }
 
-pub const ALL: Sensors = Sensors { steering: true, gyro: true, yaw: true };
+pub(crate) const ALL: Sensors = Sensors { steering: true, gyro: true, yaw: true };
 
 /// The paper's car with a gyro and a reference.
-pub fn vehicle() -> Vehicle {
+pub(crate) fn vehicle() -> Vehicle {
     Vehicle {
         gyro: Some(Gyro { noise: 0.003, rate: 40.0 }),
         reference: Some(Reference {
@@ -35,7 +35,7 @@ pub fn vehicle() -> Vehicle {
 }
 
 /// What a car in good order may have.
-pub fn allowance() -> Allowance {
+pub(crate) fn allowance() -> Allowance {
     let mut allowance = Allowance::default();
     for (field, deviation) in
         [("wheelbase", 0.001), ("track_front", 0.001), ("track_rear", 0.001), ("radius", 0.0001)]
@@ -79,9 +79,8 @@ fn asked(drive: usize, t: f64) -> (f64, f64) {
     }
 }
 
-/// A case of six drives of 12 s; `shift` alters the effects within a drive, given its number, the time and whether the
-/// car is asked to go in reverse.
-pub fn case(effects: &Effects, sensors: Sensors, seed: u64) -> Case {
+/// A case of six drives of 12 s.
+pub(crate) fn case(effects: &Effects, sensors: Sensors, seed: u64) -> Case {
     let mut vehicle = vehicle();
     if !sensors.steering {
         vehicle.steering_sensor = None;
