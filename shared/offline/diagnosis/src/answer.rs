@@ -1,10 +1,13 @@
 //! The answer's effects, its alternatives, and what to drive next.
 
+use kerbside_geometry::math;
 use kerbside_simulation::Effects;
 use kerbside_simulation::effects::ParameterDefinition;
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use crate::bench::Bench;
+use crate::bins::to_f64;
 use crate::candidate::Coordinate;
 use crate::case::{Case, Run, Series, Wheels};
 use crate::decide::SET;
@@ -26,7 +29,7 @@ pub(crate) fn effects(found: &Found<'_>, search: &Search<'_>) -> Vec<FoundEffect
     let covariance = covariance(fit);
     let mut effects = Vec::new();
     let mut row = 0;
-    for (candidate, at) in fit.set.iter().zip(&fit.at) {
+    for (member, (candidate, at)) in fit.set.iter().zip(&fit.at).enumerate() {
         let own = &search.candidates[*candidate];
         let spread: Vec<f64> = (0..at.len())
             .map(|c| {
@@ -36,8 +39,11 @@ pub(crate) fn effects(found: &Found<'_>, search: &Search<'_>) -> Vec<FoundEffect
         row += at.len();
         let of =
             |name: &str| own.definition.parameters.iter().find(|parameter| parameter.name == name);
-        let parameters = own
-            .intervals(at, &spread)
+        let intervals = match own.is_staircase() {
+            true => vec![(own.definition.parameters[0].name, staircase(search, fit, member))],
+            false => own.intervals(at, &spread),
+        };
+        let parameters = intervals
             .into_iter()
             .map(|(name, value)| FoundParameter { name, unit: of(name).map_or("", unit), value })
             .collect();
@@ -63,6 +69,46 @@ pub(crate) fn effects(found: &Found<'_>, search: &Search<'_>) -> Vec<FoundEffect
         });
     }
     effects
+}
+
+/// Points of a staircase that are tried.
+const TREADS: usize = 64;
+
+/// The interval of a coordinate whose cost is a staircase, where a slope says nothing: by the posterior at points all
+/// over its range, the others left where they are. The value is the median.
+fn staircase(search: &Search<'_>, fit: &Fit, member: usize) -> Interval {
+    let own = &search.candidates[fit.set[member]].coordinates[0];
+    let here = fit.at[member][0];
+    let nothing = Interval { value: here, low: here, high: here };
+    let Some(projection) = search.projection(&fit.set, &search.bench.all()) else { return nothing };
+    let point = |k: usize| own.low + (own.high - own.low) * (to_f64(k) + 0.5) / to_f64(TREADS);
+    let costs: Vec<f64> = (0..TREADS)
+        .into_par_iter()
+        .map(|k| {
+            let mut at = fit.at.clone();
+            at[member][0] = point(k);
+            search.fit(&fit.set, &at, &projection, 1).cost
+        })
+        .collect();
+    let least = costs.iter().copied().fold(fit.cost, f64::min);
+    let weights: Vec<f64> =
+        costs.iter().map(|cost| math::exp(-0.5 * (cost - least) / (WIDER * WIDER))).collect();
+    let whole: f64 = weights.iter().sum();
+    if whole < 1e-3 {
+        // Narrower than the points are apart.
+        let half = 0.5 * (own.high - own.low) / to_f64(TREADS);
+        return Interval { value: here, low: (here - half).max(own.low), high: here + half };
+    }
+    let reach = |share: f64| {
+        let mut sum = 0.0;
+        let at = weights.iter().position(|weight| {
+            sum += weight;
+            sum >= share * whole
+        });
+        point(at.unwrap_or(TREADS - 1))
+    };
+    let half = 0.5 * (own.high - own.low) / to_f64(TREADS);
+    Interval { value: reach(0.5), low: (reach(0.05) - half).max(own.low), high: reach(0.95) + half }
 }
 
 fn unit(parameter: &'static ParameterDefinition) -> &'static str {

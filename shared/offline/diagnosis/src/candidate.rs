@@ -229,6 +229,11 @@ impl Candidate {
         self.coordinates.iter().any(|c| matches!(c.meaning, Meaning::Limit(..)))
     }
 
+    /// Whether its cost is a staircase: commands either pass it or do not.
+    pub(crate) fn is_staircase(&self) -> bool {
+        self.definition.id == "speed_dead_zone"
+    }
+
     /// Parameters that a nuisance may share: the nuisance is left out while the effect is fitted.
     pub(crate) fn shares(&self, parameter: Parameter) -> bool {
         self.coordinates.iter().any(|c| matches!(c.meaning, Meaning::Plain(p) if p == parameter))

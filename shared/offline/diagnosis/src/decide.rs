@@ -19,6 +19,8 @@ const PAIR: f64 = 0.1;
 const UNKNOWN: f64 = 0.15;
 /// Evidences count as if there were so many times fewer values: whitened values are never quite independent.
 const TEMPER: f64 = 2.0;
+/// Runs that are asked for.
+const ENOUGH: f64 = 6.0;
 /// A second effect has to make the runs this much likelier than the first alone, in logarithms.
 const SECOND: f64 = 10.0;
 /// What is not listed has to explain at least this share of what listed effects explain beside which it stands.
@@ -57,6 +59,7 @@ pub(crate) struct Decision {
 /// Decides.
 pub(crate) fn decide(found: &Analysis<'_>) -> Decision {
     let zero = found.nothing.log_evidence();
+    let temper = temper(found);
     let names = distinct(found);
     let per_wheel = |fit: &Fit| {
         let wheels = fit.set.iter().filter(|c| found.candidates[**c].wheel.is_some()).count();
@@ -73,10 +76,10 @@ pub(crate) fn decide(found: &Analysis<'_>) -> Decision {
             } else {
                 math::ln(PAIR / (0.5 * names * (names - 1.0)))
             };
-            (i, prior - per_wheel(fit) + (fit.log_evidence() - zero) / TEMPER)
+            (i, prior - per_wheel(fit) + (fit.log_evidence() - zero) / temper)
         })
         .collect();
-    let shapes = unlisted(found, zero);
+    let shapes = unlisted(found, zero, temper);
     let highest = sets
         .iter()
         .map(|(_, weight)| *weight)
@@ -118,6 +121,12 @@ pub(crate) fn decide(found: &Analysis<'_>) -> Decision {
     decision
 }
 
+/// By what evidences are divided: few runs tell chance from cause less surely than their many values seem to.
+fn temper(found: &Analysis<'_>) -> f64 {
+    let runs = to_f64(found.bench.all().len().max(1));
+    TEMPER * (ENOUGH / runs).clamp(1.0, ENOUGH)
+}
+
 /// The answer that the probabilities give.
 fn answer(decision: &mut Decision) {
     let listed: f64 = decision.sets.iter().map(|w| w.probability).sum();
@@ -156,7 +165,7 @@ fn gains(found: &Analysis<'_>, pair: &Fit) -> bool {
 }
 
 /// What is not listed, alone and beside the likeliest listed effects, with its logarithmic weight, heaviest first.
-fn unlisted(found: &Analysis<'_>, zero: f64) -> Vec<(Beside, f64)> {
+fn unlisted(found: &Analysis<'_>, zero: f64, temper: f64) -> Vec<(Beside, f64)> {
     let count = to_f64(found.beside_nothing.len().max(1));
     let prior = math::ln(UNKNOWN / count);
     let worth = |beside: &&Beside| beside.log_evidence > UNLISTED;
@@ -164,7 +173,7 @@ fn unlisted(found: &Analysis<'_>, zero: f64) -> Vec<(Beside, f64)> {
         .beside_nothing
         .iter()
         .filter(worth)
-        .map(|beside| (*beside, prior + beside.log_evidence / TEMPER))
+        .map(|beside| (*beside, prior + beside.log_evidence / temper))
         .collect();
     if let Some(best) = found.fits.first() {
         let listed = (found.nothing.cost - best.cost).max(0.0);
@@ -172,7 +181,7 @@ fn unlisted(found: &Analysis<'_>, zero: f64) -> Vec<(Beside, f64)> {
         let prior = prior - math::ln(distinct(found));
         let enough =
             found.beside_best.iter().filter(worth).filter(|beside| beside.gain > SHARE * listed);
-        all.extend(enough.map(|beside| (*beside, prior + (base + beside.log_evidence) / TEMPER)));
+        all.extend(enough.map(|beside| (*beside, prior + (base + beside.log_evidence) / temper)));
     }
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all

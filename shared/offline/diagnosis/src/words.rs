@@ -136,9 +136,9 @@ pub(crate) fn notices(case: &Case) -> Vec<String> {
         notices.push("vehicle.toml states no [uncertainty]: the allowance of an ordinary car measured by tape is used".to_owned());
     }
     if count < 6 {
-        notices.push(format!(
-            "{count} runs: six are asked for, fewer tell chance from cause less surely"
-        ));
+        let runs = if count == 1 { "one run".to_owned() } else { format!("{count} runs") };
+        notices
+            .push(format!("{runs}: six are asked for, fewer tell chance from cause less surely"));
     }
     notices
 }
