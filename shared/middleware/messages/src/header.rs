@@ -4,8 +4,18 @@ use crate::layout::{Described, layout};
 use crate::topics::Topic;
 use crate::{Nanos, Refusal};
 
+/// The version of the layouts, for names that are put together when they are compiled.
+macro_rules! layout_version {
+    () => {
+        3
+    };
+}
+
+pub(crate) use layout_version;
+
 /// Version of all layouts together; part of every type name, so that processes of different builds refuse each other.
-pub const LAYOUT_VERSION: u16 = 3;
+/// A change of a layout raises it: `layouts.txt` beside this crate's manifest holds what it stands for.
+pub const LAYOUT_VERSION: u16 = layout_version!();
 
 layout! {
     /// The header every sample starts with.

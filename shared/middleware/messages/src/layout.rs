@@ -21,6 +21,61 @@ pub enum Kind {
     Nested(&'static Layout),
 }
 
+/// What the numbers of a field stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Meaning {
+    /// Themselves.
+    Number,
+    /// Each for a variant of this enumeration.
+    Code(&'static Enumeration),
+    /// All of them for a text: UTF-8, filled up with zeros.
+    Text,
+}
+
+/// An enumeration that messages carry as its number.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Enumeration {
+    /// Name: `Mode`.
+    pub name: &'static str,
+    /// What it tells apart.
+    pub doc: &'static str,
+    /// Its variants.
+    pub variants: &'static [Variant],
+}
+
+impl Enumeration {
+    /// The words for `code`; none for a number that stands for nothing.
+    #[must_use]
+    pub fn words(&self, code: u8) -> Option<&'static str> {
+        self.variants.iter().find(|variant| variant.code == code).map(|variant| variant.words)
+    }
+}
+
+/// A variant of an enumeration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    /// Name: `NoPlan`.
+    pub name: &'static str,
+    /// The number that messages carry.
+    pub code: u8,
+    /// The words used for it everywhere.
+    pub words: &'static str,
+}
+
+/// A type that says what the numbers of a field stand for.
+pub trait Meaningful {
+    /// What they stand for.
+    const MEANING: Meaning;
+}
+
+/// The meaning of bytes that are a text: see [`crate::text`].
+#[derive(Clone, Copy, Debug)]
+pub struct Text;
+
+impl Meaningful for Text {
+    const MEANING: Meaning = Meaning::Text;
+}
+
 /// A field of a layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
@@ -30,6 +85,8 @@ pub struct Field {
     pub kind: Kind,
     /// How many elements; none for a single value.
     pub count: Option<usize>,
+    /// What its numbers stand for.
+    pub meaning: Meaning,
     /// Bytes from the layout's beginning.
     pub offset: usize,
     /// What it means, with unit.
@@ -43,6 +100,10 @@ pub struct Layout {
     pub name: &'static str,
     /// Size in bytes.
     pub size: usize,
+    /// Alignment in bytes.
+    pub alignment: usize,
+    /// What it is.
+    pub doc: &'static str,
     /// Its fields in order, without gaps.
     pub fields: &'static [Field],
 }
@@ -78,10 +139,13 @@ pub trait Described {
     const LAYOUT: &'static Layout;
 }
 
-/// Declares a plain struct together with its description; a padding byte is a compile error.
+/// Declares a plain struct together with its description; a padding byte is a compile error. A field whose numbers
+/// stand for something says so: `pub mode: u8 as Mode`, `pub text: [u8; 64] as Text`.
 macro_rules! layout {
+    (@meaning) => { $crate::layout::Meaning::Number };
+    (@meaning $meaning:ty) => { <$meaning as $crate::layout::Meaningful>::MEANING };
     ($(#[doc = $doc:literal])+ pub struct $name:ident {
-        $($(#[doc = $field_doc:literal])+ pub $field:ident: $type:ty,)+
+        $($(#[doc = $field_doc:literal])+ pub $field:ident: $type:ty $(as $meaning:ty)?,)+
     }) => {
         $(#[doc = $doc])+
         #[repr(C)]
@@ -94,10 +158,13 @@ macro_rules! layout {
             const LAYOUT: &'static $crate::layout::Layout = &$crate::layout::Layout {
                 name: stringify!($name),
                 size: core::mem::size_of::<$name>(),
+                alignment: core::mem::align_of::<$name>(),
+                doc: concat!($($doc),+),
                 fields: &[$($crate::layout::Field {
                     name: stringify!($field),
                     kind: <$type as $crate::layout::Element>::KIND,
                     count: <$type as $crate::layout::Element>::COUNT,
+                    meaning: $crate::layout::layout!(@meaning $($meaning)?),
                     offset: core::mem::offset_of!($name, $field),
                     doc: concat!($($field_doc),+),
                 }),+],

@@ -13,6 +13,7 @@ mod admission;
 mod header;
 pub mod layout;
 mod payloads;
+pub mod pins;
 pub mod schema;
 pub mod text;
 pub mod topics;

@@ -2,6 +2,8 @@
 
 use core::time::Duration;
 
+use crate::header::layout_version;
+use crate::layout::{Enumeration, Layout, Meaning, Meaningful, Variant};
 use crate::payloads::{
     Actuator, Command, Fix, Heartbeat, Inhibit, Odometry, OperatorAnswer, OperatorRequest, Permit,
     Plan, PlanAnswer, PlanRequest, Raw, Restore, State, Travel, Truth, Uptake,
@@ -99,6 +101,24 @@ impl Process {
     }
 }
 
+impl Meaningful for Process {
+    const MEANING: Meaning = Meaning::Code(&Enumeration {
+        name: "Process",
+        doc: " The processes of an instance.",
+        variants: &{
+            let mut variants = [Variant { name: "", code: 0, words: "" }; Self::ALL.len()];
+            let mut index = 0;
+            while index < variants.len() {
+                let process = Self::ALL[index];
+                variants[index] =
+                    Variant { name: process.name(), code: process as u8, words: process.name() };
+                index += 1;
+            }
+            variants
+        },
+    });
+}
+
 impl core::fmt::Display for Process {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(self.name())
@@ -159,6 +179,23 @@ pub struct Topic {
     pub doc: &'static str,
 }
 
+impl Topic {
+    /// The topic of that name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        TABLE.iter().find(|topic| topic.name == name)
+    }
+}
+
+/// Work that is the same for every topic, but for the type of the payload.
+pub trait Visitor {
+    /// What it gives.
+    type Output;
+
+    /// Does it for payloads of type `M`.
+    fn visit<M: Message>(self) -> Self::Output;
+}
+
 macro_rules! topics {
     ($($id:literal $constant:ident $name:literal $payload:ident, $publisher:expr => [$($subscriber:ident),*],
        wakes $wakes:expr, $rate:literal Hz, fresh $freshness:expr, $delivery:expr, protected $protected:literal,
@@ -182,7 +219,7 @@ macro_rules! topics {
 
             impl Message for $payload {
                 const TOPIC: &'static Topic = &$constant;
-                const TYPE_NAME: &'static str = concat!("kerbside.", stringify!($payload), ".v2");
+                const TYPE_NAME: &'static str = concat!("kerbside.", stringify!($payload), ".v", layout_version!());
 
                 fn header(&self) -> &Header {
                     &self.header
@@ -203,9 +240,26 @@ macro_rules! topics {
 
         /// The layout of a topic's payload.
         #[must_use]
-        pub fn layout_of(topic: &Topic) -> Option<&'static crate::layout::Layout> {
+        pub fn layout_of(topic: &Topic) -> Option<&'static Layout> {
             match topic.id {
                 $($id => Some(<$payload as crate::layout::Described>::LAYOUT),)+
+                _ => None,
+            }
+        }
+
+        /// The name of a payload's type in shared memory.
+        #[must_use]
+        pub fn type_name_of(topic: &Topic) -> Option<&'static str> {
+            match topic.id {
+                $($id => Some(<$payload as Message>::TYPE_NAME),)+
+                _ => None,
+            }
+        }
+
+        /// Has `visitor` do its work with the type of a topic's payload; none for a topic that the table does not have.
+        pub fn visit<V: Visitor>(topic: &Topic, visitor: V) -> Option<V::Output> {
+            match topic.id {
+                $($id => Some(visitor.visit::<$payload>()),)+
                 _ => None,
             }
         }

@@ -6,7 +6,7 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
 use iceoryx2::prelude::{Config, FileName, SemanticString};
-use kerbside_messages::Process;
+use kerbside_messages::{LAYOUT_VERSION, Process};
 
 use crate::Ticker;
 use crate::lock::{FileLock, LockError};
@@ -296,7 +296,8 @@ impl Instance {
         if Process::ALL.into_iter().any(lives) { Ok(()) } else { self.remove() }
     }
 
-    /// Writes the middleware's configuration for the instance's processes.
+    /// Writes the middleware's configuration for the instance's processes, with the version of the layouts for those in
+    /// other languages.
     ///
     /// # Errors
     /// [`InstanceError::File`].
@@ -305,7 +306,7 @@ impl Instance {
         let wrap = |source| InstanceError::File { path: path.clone(), source };
         fs::create_dir_all(self.root()).map_err(wrap)?;
         let text = format!(
-            "[global]\nroot-path = \"{}\"\n{PREFIX_KEY}{}\"\n",
+            "# layout version {LAYOUT_VERSION}\n[global]\nroot-path = \"{}\"\n{PREFIX_KEY}{}\"\n",
             self.root().display(),
             self.new_life()
         );

@@ -14,6 +14,7 @@
 #![allow(unsafe_code)]
 
 mod bare;
+mod census;
 mod clock;
 mod error;
 mod instance;
@@ -32,6 +33,7 @@ pub use bare::{
     BarePlanPublisher, BarePlanSubscriber, BarePublisher, BareReceived, BareServices,
     BareSubscriber, bare_listener, bare_notifier,
 };
+pub use census::{Census, Participant};
 pub use clock::{Ticker, now};
 pub use error::RuntimeError;
 pub use instance::{Instance, InstanceError, MAX_NAME};
@@ -40,7 +42,7 @@ pub use process::{close_inherited_on_exec, end_on_broken_pipe, kill, resume, ter
 pub use publisher::{PlanPublisher, Publisher};
 pub use realtime::{RealtimeReport, RealtimeRequest, enter_realtime, last_core};
 pub use request::{Asked, Client, Pending, Server};
-pub use services::{Services, depth};
+pub use services::{GUESTS, Services, depth};
 pub use session::{Session, SessionError, SweepReport};
 pub use subscriber::{Newest, PlanSubscriber, Received, Standing, Subscriber};
 pub use wait::{Listener, Notifier, Readiness, poll_readable};

@@ -16,9 +16,11 @@ use crate::wire::{Wire, WirePoint};
 use crate::{Instance, InstanceError};
 
 /// Nodes that may take part: the processes, and tools beside them.
-const NODES: usize = 40;
-/// Subscribers beyond those of the table: tools, and those whose dead predecessor is not swept yet.
-const SPARE_SUBSCRIBERS: usize = 8;
+pub(crate) const NODES: usize = 40;
+/// Subscribers of a topic that the table does not name: tools, and processes that others wrote.
+pub const GUESTS: usize = 6;
+/// Subscribers beyond those of the table: guests, and those whose dead predecessor is not swept yet.
+const SPARE_SUBSCRIBERS: usize = GUESTS + 2;
 /// Publishers of a topic that anybody may publish.
 const ANY_PUBLISHERS: usize = 16;
 /// A process and its dead predecessor.
@@ -137,6 +139,11 @@ pub fn depth(topic: &Topic) -> usize {
     }
 }
 
+/// Places for subscribers of a topic.
+pub(crate) fn subscribers(topic: &Topic) -> usize {
+    topic.subscribers.len() + SPARE_SUBSCRIBERS
+}
+
 fn publishers(topic: &Topic) -> usize {
     match topic.publisher {
         Publisher::Any => ANY_PUBLISHERS,
@@ -157,7 +164,7 @@ fn create<M: Message>(
         .history_size(usize::from(topic.delivery == Delivery::Newest))
         .subscriber_max_buffer_size(depth(topic))
         .subscriber_max_borrowed_samples(BORROWED)
-        .max_subscribers(topic.subscribers.len() + SPARE_SUBSCRIBERS)
+        .max_subscribers(subscribers(topic))
         .max_publishers(publishers(topic))
         .max_nodes(NODES)
         .create()
@@ -179,7 +186,7 @@ fn create_plan(
         .history_size(1)
         .subscriber_max_buffer_size(PLAN_DEPTH)
         .subscriber_max_borrowed_samples(BORROWED)
-        .max_subscribers(topic.subscribers.len() + SPARE_SUBSCRIBERS)
+        .max_subscribers(subscribers(topic))
         .max_publishers(ONE_PUBLISHER)
         .max_nodes(NODES)
         .create()

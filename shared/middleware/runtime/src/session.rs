@@ -2,19 +2,23 @@
 
 use core::time::Duration;
 
+use iceoryx2::port::subscriber::SubscriberCreateError;
 use iceoryx2::prelude::{
-    Config, FilePath, Node, NodeBuilder, NodeName, SemanticString, SignalHandlingMode, ipc,
+    Config, FileName, FilePath, MessagingPattern, Node, NodeBuilder, NodeName, SemanticString,
+    SignalHandlingMode, ipc,
 };
+use iceoryx2::service::Service as _;
 use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use iceoryx2::service::builder::request_response::RequestResponseOpenError;
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
-use kerbside_messages::{Message, Plan, Process};
+use iceoryx2::service::static_config::messaging_pattern::MessagingPattern as Pattern;
+use kerbside_messages::{Message, Plan, Process, Topic};
 
 use crate::error::{Context, RuntimeError};
 use crate::publisher::{PlanPublisher, Publisher};
 use crate::request::{Client, Server};
-use crate::services::service_name;
+use crate::services::{NODES, service_name};
 use crate::subscriber::{PlanSubscriber, Subscriber};
 use crate::wait::{Listener, Notifier};
 use crate::wire::{Wire, WirePoint};
@@ -36,17 +40,37 @@ pub enum SessionError {
     },
     /// The other side was built from other layouts.
     #[error(
-        "topic {topic}: the running stack has another layout of {ours}; stop it and start one build everywhere"
+        "topic {topic}: the running stack has {theirs}, this build has {ours}; stop the stack and start one build everywhere"
     )]
     Incompatible {
         /// Which topic.
         topic: &'static str,
-        /// The type name of this build.
-        ours: &'static str,
+        /// Type name and size of this build.
+        ours: String,
+        /// The same of the running stack.
+        theirs: String,
+    },
+    /// Every place is taken.
+    #[error("topic {topic}: all {places} places for {role} are taken{}", holders(.by))]
+    Full {
+        /// Which topic.
+        topic: &'static str,
+        /// Who may have such a place: `tools and other guests`.
+        role: &'static str,
+        /// How many there are.
+        places: usize,
+        /// Who has them, where that is known: pids.
+        by: Vec<u32>,
     },
     /// The middleware refused.
     #[error(transparent)]
     Middleware(#[from] RuntimeError),
+}
+
+/// Who holds what is full, in words.
+fn holders(pids: &[u32]) -> String {
+    let pids: Vec<_> = pids.iter().map(u32::to_string).collect();
+    if pids.is_empty() { String::new() } else { format!(", by process {}", pids.join(", ")) }
 }
 
 impl SessionError {
@@ -75,6 +99,8 @@ pub struct SweepReport {
 pub struct Session {
     node: Node<ipc::Service>,
     instance: Instance,
+    /// The life of the instance that it joined.
+    prefix: FileName,
 }
 
 impl core::fmt::Debug for Session {
@@ -118,13 +144,21 @@ impl Session {
             instance.remove_life(&config).map_err(SessionError::Instance)?;
             return Err(SessionError::no_supervisor(instance));
         }
-        Ok(Self { node, instance: instance.clone() })
+        Ok(Self { node, instance: instance.clone(), prefix: config.global.prefix })
     }
 
     /// The instance.
     #[must_use]
     pub fn instance(&self) -> &Instance {
         &self.instance
+    }
+
+    /// Whether the life of the instance that was joined goes on: its supervisor lives, and is the one it was.
+    #[must_use]
+    pub fn is_live(&self) -> bool {
+        let config = self.instance.middleware_config().ok().flatten();
+        self.instance.supervisor().is_some()
+            && config.is_some_and(|config| config.global.prefix == self.prefix)
     }
 
     /// Removes what dead processes left in the middleware. Only the supervisor does this, and on a thread that nothing
@@ -167,12 +201,8 @@ impl Session {
         buffer: usize,
     ) -> Result<Subscriber<M>, SessionError> {
         let factory = self.topic::<M>(process)?;
-        let port = factory
-            .subscriber_builder()
-            .buffer_size(buffer)
-            .create()
-            .context("create subscriber", M::TOPIC.name)?;
-        Ok(Subscriber::new(port))
+        let created = factory.subscriber_builder().buffer_size(buffer).create();
+        Ok(Subscriber::new(created.map_err(|error| subscriber_error(M::TOPIC, error))?))
     }
 
     /// The publisher of plans.
@@ -195,12 +225,8 @@ impl Session {
     /// [`SessionError`].
     pub fn plan_subscriber(&self) -> Result<PlanSubscriber, SessionError> {
         let factory = self.plans()?;
-        let port = factory
-            .subscriber_builder()
-            .buffer_size(1)
-            .create()
-            .context("create subscriber", Plan::TOPIC.name)?;
-        Ok(PlanSubscriber::new(port))
+        let created = factory.subscriber_builder().buffer_size(1).create();
+        Ok(PlanSubscriber::new(created.map_err(|error| subscriber_error(Plan::TOPIC, error))?))
     }
 
     /// The server that answers `Q` with `A`.
@@ -242,7 +268,7 @@ impl Session {
         ))
     }
 
-    fn topic<M: Message>(
+    pub(crate) fn topic<M: Message>(
         &self,
         process: Option<Process>,
     ) -> Result<publish_subscribe::PortFactory<ipc::Service, Wire<M>, ()>, SessionError> {
@@ -250,10 +276,10 @@ impl Session {
             .service_builder(&service_name(M::TOPIC, process)?)
             .publish_subscribe::<Wire<M>>()
             .open()
-            .map_err(|error| self.publish_subscribe_error::<M>(error))
+            .map_err(|error| self.publish_subscribe_error::<M>(error, process))
     }
 
-    fn plans(
+    pub(crate) fn plans(
         &self,
     ) -> Result<publish_subscribe::PortFactory<ipc::Service, [WirePoint], Wire<Plan>>, SessionError>
     {
@@ -262,11 +288,11 @@ impl Session {
             .publish_subscribe::<[WirePoint]>()
             .user_header::<Wire<Plan>>()
             .open()
-            .map_err(|error| self.publish_subscribe_error::<Plan>(error))
+            .map_err(|error| self.publish_subscribe_error::<Plan>(error, None))
     }
 
     #[allow(clippy::type_complexity)] // the middleware's own five parameters
-    fn door<Q: Message, A: Message>(
+    pub(crate) fn door<Q: Message, A: Message>(
         &self,
     ) -> Result<request_response::PortFactory<ipc::Service, Wire<Q>, (), Wire<A>, ()>, SessionError>
     {
@@ -295,11 +321,13 @@ impl Session {
     fn publish_subscribe_error<M: Message>(
         &self,
         error: PublishSubscribeOpenError,
+        process: Option<Process>,
     ) -> SessionError {
         match error {
+            PublishSubscribeOpenError::ExceedsMaxNumberOfNodes => no_room(M::TOPIC),
             PublishSubscribeOpenError::DoesNotExist => self.missing::<M>(),
             PublishSubscribeOpenError::IncompatibleTypes => {
-                SessionError::Incompatible { topic: M::TOPIC.name, ours: M::TYPE_NAME }
+                self.incompatible::<M>(process, MessagingPattern::PublishSubscribe)
             }
             other => SessionError::Middleware(RuntimeError::of("open service", M::TOPIC.name)(
                 Box::new(other),
@@ -307,11 +335,39 @@ impl Session {
         }
     }
 
+    /// Both layouts of a topic by name: this build's, and that of the running stack.
+    fn incompatible<M: Message>(
+        &self,
+        process: Option<Process>,
+        pattern: MessagingPattern,
+    ) -> SessionError {
+        let details = service_name(M::TOPIC, process).ok().and_then(|name| {
+            ipc::Service::details(&name, self.node.config(), pattern).ok().flatten()
+        });
+        let theirs = details.map(|service| {
+            let types = match service.static_details.messaging_pattern() {
+                Pattern::PublishSubscribe(config) => config.message_type_details(),
+                Pattern::RequestResponse(config) => config.request_message_type_details(),
+                _ => return "a service of another kind".to_owned(),
+            };
+            // A plan's head is the header of its points.
+            let plan = M::TOPIC.id == Plan::TOPIC.id;
+            let found = if plan { &types.user_header } else { &types.payload };
+            format!("{} of {} bytes", found.type_name(), found.size())
+        });
+        SessionError::Incompatible {
+            topic: M::TOPIC.name,
+            ours: format!("{} of {} bytes", M::TYPE_NAME, size_of::<M>()),
+            theirs: theirs.unwrap_or_else(|| "another layout".to_owned()),
+        }
+    }
+
     fn request_response_error<M: Message>(&self, error: RequestResponseOpenError) -> SessionError {
         match error {
             RequestResponseOpenError::DoesNotExist => self.missing::<M>(),
+            RequestResponseOpenError::ExceedsMaxNumberOfNodes => no_room(M::TOPIC),
             RequestResponseOpenError::IncompatibleRequestOrResponseType => {
-                SessionError::Incompatible { topic: M::TOPIC.name, ours: M::TYPE_NAME }
+                self.incompatible::<M>(None, MessagingPattern::RequestResponse)
             }
             other => SessionError::Middleware(RuntimeError::of("open service", M::TOPIC.name)(
                 Box::new(other),
@@ -322,9 +378,26 @@ impl Session {
     fn event_error<M: Message>(&self, error: EventOpenError) -> SessionError {
         match error {
             EventOpenError::DoesNotExist => self.missing::<M>(),
+            EventOpenError::ExceedsMaxNumberOfNodes => no_room(M::TOPIC),
             other => SessionError::Middleware(RuntimeError::of("open event", M::TOPIC.name)(
                 Box::new(other),
             )),
         }
     }
+}
+
+fn subscriber_error(topic: &'static Topic, error: SubscriberCreateError) -> SessionError {
+    match error {
+        SubscriberCreateError::ExceedsMaxSupportedSubscribers => SessionError::Full {
+            topic: topic.name,
+            role: "subscribers",
+            places: crate::services::subscribers(topic),
+            by: Vec::new(),
+        },
+        other => RuntimeError::of("create subscriber", topic.name)(Box::new(other)).into(),
+    }
+}
+
+fn no_room(topic: &'static Topic) -> SessionError {
+    SessionError::Full { topic: topic.name, role: "participants", places: NODES, by: Vec::new() }
 }

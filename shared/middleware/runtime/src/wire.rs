@@ -25,7 +25,7 @@ pub(crate) struct WirePoint(pub(crate) TrajectoryPoint);
 // SAFETY: as for `Wire`: `TrajectoryPoint` is `Pod`.
 unsafe impl ZeroCopySend for WirePoint {
     unsafe fn type_name() -> &'static str {
-        "kerbside.TrajectoryPoint.v2"
+        TrajectoryPoint::TYPE_NAME
     }
 }
 

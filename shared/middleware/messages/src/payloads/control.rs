@@ -1,7 +1,7 @@
 //! From command to actuators.
 
 use super::{codes, finite, known, within};
-use crate::layout::layout;
+use crate::layout::{Text, layout};
 use crate::{Header, Refusal};
 
 codes! {
@@ -60,9 +60,9 @@ layout! {
         /// The count of arms it acts under.
         pub arm: u64,
         /// [`TrackingPhase`].
-        pub phase: u8,
+        pub phase: u8 as TrackingPhase,
         /// [`TrackingStop`].
-        pub stop: u8,
+        pub stop: u8 as TrackingStop,
         /// Unused.
         pub reserved: [u8; 6],
     }
@@ -91,7 +91,7 @@ layout! {
         /// When it ends \[ns\].
         pub expiry: u64,
         /// [`crate::Mode`].
-        pub mode: u8,
+        pub mode: u8 as super::Mode,
         /// 1: motion is permitted.
         pub granted: u8,
         /// Unused.
@@ -116,9 +116,9 @@ layout! {
         /// When it ends \[ns\].
         pub expiry: u64,
         /// Who asks: UTF-8, filled up with zeros.
-        pub who: [u8; 32],
+        pub who: [u8; 32] as Text,
         /// Why: UTF-8, filled up with zeros.
-        pub why: [u8; 96],
+        pub why: [u8; 96] as Text,
     }
 }
 
@@ -167,9 +167,9 @@ layout! {
         /// Sequence of the command it follows; 0 for none.
         pub command: u64,
         /// [`AlterReason`] of this output.
-        pub reason: u8,
+        pub reason: u8 as AlterReason,
         /// [`AlterReason`] that latched the gate; `None` while it is open.
-        pub latch: u8,
+        pub latch: u8 as AlterReason,
         /// Unused.
         pub reserved: [u8; 6],
     }

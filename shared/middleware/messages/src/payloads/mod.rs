@@ -23,7 +23,7 @@ pub use supervision::{
     Cause, Heartbeat, MAX_ROWS, Mode, OperatorAnswer, OperatorRequest, ProcessRow, ProcessState,
     State, Verb,
 };
-pub use vehicle::{Raw, Truth};
+pub use vehicle::{Raw, Truth, WHEELS};
 
 use crate::Refusal;
 
@@ -37,6 +37,19 @@ macro_rules! codes {
         #[repr(u8)]
         pub enum $name {
             $($(#[doc = $variant_doc])+ $variant = $code,)+
+        }
+
+        impl $crate::layout::Meaningful for $name {
+            const MEANING: $crate::layout::Meaning =
+                $crate::layout::Meaning::Code(&$crate::layout::Enumeration {
+                    name: stringify!($name),
+                    doc: concat!($($doc),+),
+                    variants: &[$($crate::layout::Variant {
+                        name: stringify!($variant),
+                        code: $code,
+                        words: $text,
+                    }),+],
+                });
         }
 
         impl $name {

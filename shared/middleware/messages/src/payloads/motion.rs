@@ -1,7 +1,7 @@
 //! From counts to a pose.
 
 use super::{FAR, FilterState, codes, covariance, finite, known, within};
-use crate::layout::layout;
+use crate::layout::{Text, layout};
 use crate::{Header, Refusal};
 
 codes! {
@@ -48,7 +48,7 @@ layout! {
         /// Readings refused since the start.
         pub refused: u32,
         /// [`WheelStatus`] of fl, fr, rl, rr.
-        pub status: [u8; 4],
+        pub status: [u8; 4] as WheelStatus,
         /// 1: readings are missing before this one; the increment spans them.
         pub gap: u8,
         /// 1: the steering angle was read with or before this travel.
@@ -217,13 +217,13 @@ layout! {
         /// Travels without usable wheels.
         pub unusable: u32,
         /// [`EstimatorState`].
-        pub state: u8,
+        pub state: u8 as EstimatorState,
         /// [`OdometryModel`].
-        pub model: u8,
+        pub model: u8 as OdometryModel,
         /// [`ResetReason`] of the newest jump.
-        pub reset_reason: u8,
+        pub reset_reason: u8 as ResetReason,
         /// [`FixVerdict`] of the newest fix.
-        pub fix_verdict: u8,
+        pub fix_verdict: u8 as FixVerdict,
         /// 1: no wheel has turned for the configured time.
         pub standstill: u8,
         /// 1: this step corrected.
@@ -231,9 +231,9 @@ layout! {
         /// 1: the travel behind this step had a gap.
         pub gap: u8,
         /// [`FilterKind`].
-        pub filter: u8,
+        pub filter: u8 as FilterKind,
         /// [`WheelUse`] of fl, fr, rl, rr.
-        pub wheel_use: [u8; 4],
+        pub wheel_use: [u8; 4] as WheelUse,
         /// Sequence of the newest fix judged, 0 for none.
         pub fix_sequence: u64,
         /// What the filter knows besides, for a later life of the estimator.
@@ -298,7 +298,7 @@ layout! {
         /// Heading of the marker in the body frame \[rad\].
         pub marker_yaw: f64,
         /// Who says so: UTF-8, filled up with zeros.
-        pub source: [u8; 32],
+        pub source: [u8; 32] as Text,
     }
 }
 

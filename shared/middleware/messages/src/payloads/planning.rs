@@ -1,7 +1,8 @@
 //! Goals, plans and their certificates.
 
 use super::{FAR, codes, finite, known, within};
-use crate::layout::layout;
+use crate::header::layout_version;
+use crate::layout::{Text, layout};
 use crate::{Header, Refusal};
 
 /// Points of the longest plan.
@@ -133,11 +134,11 @@ layout! {
         /// Changes of the travel direction.
         pub gear_changes: u32,
         /// [`PlanVerdict`].
-        pub verdict: u8,
+        pub verdict: u8 as PlanVerdict,
         /// Unused.
         pub reserved: [u8; 3],
         /// Details for people: UTF-8, filled up with zeros.
-        pub text: [u8; 160],
+        pub text: [u8; 160] as Text,
     }
 }
 
@@ -168,6 +169,11 @@ layout! {
         /// Its rate \[rad/s\].
         pub steering_rate: f64,
     }
+}
+
+impl TrajectoryPoint {
+    /// Name of its type in shared memory, with the version of the layouts.
+    pub const TYPE_NAME: &'static str = concat!("kerbside.TrajectoryPoint.v", layout_version!());
 }
 
 layout! {

@@ -14,7 +14,7 @@ layout! {
         /// Sequence of the newest odometry the reader has taken in; 0 before the first.
         pub odometry: u64,
         /// [`Process`] that reads.
-        pub reader: u8,
+        pub reader: u8 as Process,
         /// Unused.
         pub reserved: [u8; 7],
     }

@@ -1,7 +1,7 @@
 //! Modes, signs of life, and the operator's door.
 
 use super::{codes, finite, known};
-use crate::layout::layout;
+use crate::layout::{Text, layout};
 use crate::topics::Process;
 use crate::{Header, Refusal};
 
@@ -99,13 +99,13 @@ layout! {
         /// Age of its newest heartbeat \[ms\].
         pub age_ms: u32,
         /// [`Process`].
-        pub process: u8,
+        pub process: u8 as Process,
         /// [`ProcessState`].
-        pub state: u8,
+        pub state: u8 as ProcessState,
         /// Unused.
         pub reserved: [u8; 6],
         /// What it waits for: UTF-8, filled up with zeros.
-        pub waiting_for: [u8; 64],
+        pub waiting_for: [u8; 64] as Text,
     }
 }
 
@@ -126,17 +126,17 @@ layout! {
         /// Number of rows.
         pub rows: u32,
         /// [`Mode`].
-        pub mode: u8,
+        pub mode: u8 as Mode,
         /// [`Cause`].
-        pub cause: u8,
+        pub cause: u8 as Cause,
         /// [`Process`] the cause names; 255 for none.
-        pub culprit: u8,
+        pub culprit: u8 as Process,
         /// 1: every process beats and nothing hinders an arm but the pose.
         pub healthy: u8,
         /// Unused.
         pub reserved: [u8; 4],
         /// The cause in words: UTF-8, filled up with zeros.
-        pub text: [u8; 128],
+        pub text: [u8; 128] as Text,
         /// A row per process.
         pub processes: [ProcessRow; MAX_ROWS],
     }
@@ -189,7 +189,7 @@ layout! {
         /// Checkpoints passed out of order since the start.
         pub disorders: u32,
         /// [`Process`].
-        pub process: u8,
+        pub process: u8 as Process,
         /// 1: all inputs are there, the loop runs.
         pub ready: u8,
         /// 1: failed its own check; `text` says which.
@@ -199,7 +199,7 @@ layout! {
         /// Unused.
         pub reserved: [u8; 4],
         /// What it waits for, or what failed: UTF-8, filled up with zeros.
-        pub text: [u8; 64],
+        pub text: [u8; 64] as Text,
     }
 }
 
@@ -232,7 +232,7 @@ layout! {
         /// Pid of the client.
         pub pid: u32,
         /// [`Verb`].
-        pub verb: u8,
+        pub verb: u8 as Verb,
         /// Unused.
         pub reserved: [u8; 3],
     }
@@ -254,13 +254,13 @@ layout! {
         /// Count of arms after the request.
         pub arms: u64,
         /// [`Mode`] after the request.
-        pub mode: u8,
+        pub mode: u8 as Mode,
         /// 1: done.
         pub accepted: u8,
         /// Unused.
         pub reserved: [u8; 6],
         /// Why not: UTF-8, filled up with zeros.
-        pub text: [u8; 160],
+        pub text: [u8; 160] as Text,
     }
 }
 

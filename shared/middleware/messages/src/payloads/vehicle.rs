@@ -4,6 +4,9 @@ use super::{FAR, finite, within};
 use crate::layout::layout;
 use crate::{Header, Refusal};
 
+/// Names of the wheels, in the order of every array; bit i of a mask is wheel i.
+pub const WHEELS: [&str; 4] = ["fl", "fr", "rl", "rr"];
+
 layout! {
     /// A reading as the vehicle reported it. `header.stamp` is the arrival at the host.
     pub struct Raw {
