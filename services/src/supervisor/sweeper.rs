@@ -1,13 +1,17 @@
 //! Sweeps what dead processes left in the middleware, on a thread of its own: a sweep takes milliseconds, and the
 //! supervisor's permits live for 40.
 
-use std::sync::mpsc::{SyncSender, sync_channel};
+use core::time::Duration;
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
 use kerbside_messages::Process;
 use kerbside_runtime::{Instance, Session};
 
 use crate::exit::Failure;
+
+/// Tools and processes that others wrote die unseen: what they left is swept after so long at most.
+const UNASKED: Duration = Duration::from_secs(5);
 
 /// The sweeping thread; ends when dropped.
 #[derive(Debug)]
@@ -28,7 +32,7 @@ impl Sweeper {
                     Ok(session) => session,
                     Err(error) => return tracing::error!(%error, "no sweeping"),
                 };
-                while receiver.recv().is_ok() {
+                while receiver.recv_timeout(UNASKED) != Err(RecvTimeoutError::Disconnected) {
                     let report = session.sweep();
                     tracing::debug!(?report, "swept");
                 }
