@@ -96,3 +96,11 @@ fn a_filter_step_is_measured_against_its_twin_where_there_is_a_compiler() {
         }
     }
 }
+
+#[test]
+fn the_control_path_is_measured_with_top_beside_it() {
+    let (object, output) = bench(&["tools", "--seconds", "2"]);
+    check(&object, &output);
+    let rows = object["rows"].as_array().unwrap();
+    assert!(rows.len() == 2 && rows.iter().all(|row| row["rival"] == "without top"), "{object}");
+}

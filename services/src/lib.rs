@@ -33,6 +33,7 @@ pub mod service;
 pub mod simulate;
 pub mod supervisor;
 pub mod tables;
+pub mod tools;
 pub mod tracker;
 pub mod trial;
 pub mod vehicle;

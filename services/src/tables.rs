@@ -47,3 +47,16 @@ pub fn figures(header: &[&str], numbers: &[usize]) -> Table {
     }
     table
 }
+
+/// The same with less room between columns, for as many as a terminal holds; names in the first column do not break.
+#[must_use]
+pub fn dense_figures(header: &[&str], numbers: &[usize]) -> Table {
+    let mut table = figures(header, numbers);
+    table.column_iter_mut().for_each(|column| {
+        column.set_padding((0, 1));
+    });
+    if let Some(names) = table.column_mut(0) {
+        names.set_constraint(ColumnConstraint::ContentWidth);
+    }
+    table
+}

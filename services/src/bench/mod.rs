@@ -1,6 +1,7 @@
 //! `bench`: what a hop, the pipeline, a start and a filter step cost on this machine, held against limits.
 
 mod chain;
+mod drive;
 mod filter;
 mod hop;
 mod peer;
@@ -9,6 +10,7 @@ mod replay;
 mod rows;
 mod start;
 mod statistics;
+mod tools;
 mod transport;
 
 use std::os::unix::process::CommandExt;
@@ -25,6 +27,9 @@ pub enum BenchVerb {
     /// From encoder reading to command in a stack that drives, and its work against bare hops.
     #[command(after_help = "Example: kerbside bench pipeline garage --seconds 16")]
     Pipeline(pipeline::PipelineArgs),
+    /// The control path of a stack that drives, with `top` beside it and without.
+    #[command(after_help = "Example: kerbside bench tools garage --seconds 14")]
+    Tools(tools::ToolsArgs),
     /// A whole stack from nothing to READY.
     #[command(after_help = "Example: kerbside bench start --repeats 10")]
     Start(start::StartArgs),
@@ -50,6 +55,7 @@ pub fn run(verb: &BenchVerb) -> Result<Exit, Failure> {
     match verb {
         BenchVerb::Transport(args) => transport::run(args),
         BenchVerb::Pipeline(args) => pipeline::run(args),
+        BenchVerb::Tools(args) => tools::run(args),
         BenchVerb::Start(args) => start::run(args),
         BenchVerb::Replay(args) => replay::run(args),
         BenchVerb::Filter(args) => filter::run(args),

@@ -5,22 +5,18 @@
 //! the stack every other second, reads a line and writes to it. Both are told with and without real-time rights.
 
 use core::time::Duration;
-use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
 
-use kerbside_messages::{Actuator, Command, Mode, Nanos, Odometry, Process, Raw, State, Travel};
+use kerbside_messages::{Actuator, Command, Nanos, Odometry, Process, Raw, Travel};
 use kerbside_runtime::{
-    BareServices, BareSubscriber, Instance, Newest, RealtimeRequest, Session, SessionError,
-    Subscriber, Ticker, enter_realtime, now,
+    BareServices, BareSubscriber, RealtimeRequest, Session, SessionError, Ticker, enter_realtime,
 };
 use serde_json::{Value, json};
 
 use super::chain::{Chain, PATH};
+use super::drive::{Account, Drive, Watch};
 use super::rows::{Row, Told, tell};
 use super::statistics::{Blocks, median, ratio_of_medians};
 use crate::exit::{Exit, Failure};
-use crate::output;
 
 /// The pipeline's own work may be so many times that of bare hops.
 const LIMIT: f64 = 1.5;
@@ -28,8 +24,6 @@ const LIMIT: f64 = 1.5;
 const WINDOW: Duration = Duration::from_millis(100);
 /// Windows of a slice with or without the rival.
 const SLICE: u32 = 10;
-/// Longest wait for the car to drive \[ns\].
-const START: Nanos = 30_000_000_000;
 /// Priority of the control path.
 const PRIORITY: u8 = 50;
 
@@ -52,19 +46,25 @@ pub struct PipelineArgs {
 
 /// A way of scheduling the control path.
 #[derive(Clone, Debug)]
-struct Scheduling {
+pub struct Scheduling {
     name: &'static str,
     request: RealtimeRequest,
 }
 
 impl Scheduling {
+    /// Without rights.
+    #[must_use]
+    pub fn ordinary() -> Self {
+        Self { name: "ordinary scheduling", request: RealtimeRequest::default() }
+    }
+
     /// Without rights; and with, on any core and on one.
     fn all() -> Vec<Self> {
         let cores = std::thread::available_parallelism().map_or(1, core::num::NonZero::get);
         let real_time =
             |cores| RealtimeRequest { priority: Some(PRIORITY), lock_memory: true, cores };
         let mut all = vec![
-            Self { name: "ordinary scheduling", request: RealtimeRequest::default() },
+            Self::ordinary(),
             Self { name: "real time, any core", request: real_time((0..cores).collect()) },
         ];
         if cores > 1 {
@@ -82,7 +82,8 @@ impl Scheduling {
     }
 
     /// A stack of the 1:6 car with this scheduling.
-    fn stack(&self) -> String {
+    #[must_use]
+    pub fn stack(&self) -> String {
         let enabled = if self.request.priority.is_some() { "on" } else { "off" };
         let cores = match &self.request.cores[..] {
             [] => String::new(),
@@ -118,137 +119,6 @@ pub fn run(args: &PipelineArgs) -> Result<Exit, Failure> {
     Ok(tell(&told, args.json))
 }
 
-/// A stack that drives, in an instance of its own.
-struct Drive {
-    park: Child,
-    instance: Instance,
-    folder: PathBuf,
-}
-
-impl Drive {
-    fn start(args: &PipelineArgs, scheduling: &Scheduling) -> Result<Self, Failure> {
-        let folder = std::env::temp_dir().join(format!("kerbside-bench-{}", output::stamp()));
-        fs::create_dir_all(&folder).map_err(Failure::internal)?;
-        let stack = folder.join("stack.toml");
-        output::write(&stack, &scheduling.stack())?;
-        // The same name each time: a process takes part in one instance only.
-        let name = Instance::fresh_name("bench");
-        let mut command = super::own_executable();
-        command.args([
-            "park",
-            &args.scenario,
-            "--headless",
-            "--rearm",
-            "--json",
-            "--instance",
-            &name,
-        ]);
-        command.arg("--config").arg(&stack).arg("--out").arg(folder.join("out"));
-        kerbside_runtime::close_inherited_on_exec();
-        let park = command
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .spawn()
-            .map_err(Failure::internal)?;
-        Ok(Self { park, instance: Instance::named(&name)?, folder })
-    }
-
-    fn join(&mut self) -> Result<(Session, Watch), Failure> {
-        let deadline = now() + START;
-        let mut look = Ticker::new(Duration::from_millis(10));
-        loop {
-            let joined = Session::join(&self.instance, Process::Operator)
-                .and_then(|session| Watch::open(&session).map(|watch| (session, watch)));
-            match joined {
-                Ok(joined) => return Ok(joined),
-                Err(error) if !error.is_missing() => return Err(error.into()),
-                Err(error) if now() > deadline => return Err(Failure::unavailable(error)),
-                Err(_) => {}
-            }
-            if !matches!(self.park.try_wait(), Ok(None)) {
-                return Err(Failure::unavailable("the stack ended at its start"));
-            }
-            look.wait();
-        }
-    }
-}
-
-impl Drive {
-    /// Waits until the car drives; false when the manoeuvre is over. A car that a busy machine stops is armed again.
-    fn goes_on(&mut self, watch: &mut Watch, tick: &mut Ticker) -> Result<bool, Failure> {
-        let deadline = now() + START;
-        loop {
-            watch.take_in();
-            if watch.drives() {
-                return Ok(true);
-            }
-            if !matches!(self.park.try_wait(), Ok(None)) || watch.mode() == Some(Mode::Done) {
-                return Ok(false);
-            }
-            if now() > deadline {
-                return Err(Failure::unavailable("the car did not drive"));
-            }
-            tick.wait();
-        }
-    }
-}
-
-impl Drop for Drive {
-    fn drop(&mut self) {
-        kerbside_runtime::terminate(self.park.id());
-        let _ = self.park.wait();
-        let _ = fs::remove_dir_all(&self.folder);
-    }
-}
-
-/// What is watched of the stack.
-struct Watch {
-    state: Newest<State>,
-    raw: Subscriber<Raw>,
-    command: Subscriber<Command>,
-    readings: u64,
-}
-
-impl Watch {
-    fn open(session: &Session) -> Result<Self, SessionError> {
-        Ok(Self {
-            state: Newest::of(session.subscriber(None, 1)?),
-            raw: session.subscriber(None, 512)?,
-            command: session.subscriber(None, 256)?,
-            readings: 0,
-        })
-    }
-
-    /// Takes in what came; the latencies of the commands among it.
-    fn take_in(&mut self) -> Vec<Nanos> {
-        self.state.update();
-        while let Some(raw) = self.raw.receive() {
-            self.readings = raw.header.sequence;
-        }
-        let latency = |command: kerbside_runtime::Received<Command>| {
-            command.header.sent.saturating_sub(command.header.origin)
-        };
-        core::iter::from_fn(|| self.command.receive()).map(latency).collect()
-    }
-
-    fn mode(&self) -> Option<Mode> {
-        self.state.get().map(State::mode)
-    }
-
-    fn drives(&self) -> bool {
-        self.mode() == Some(Mode::Driving)
-    }
-
-    fn pids(&self) -> Vec<(Process, u32)> {
-        let rows = self.state.get().map(State::rows).unwrap_or_default();
-        let pid_of = |process: Process| {
-            let row = rows.iter().find(|row| row.process == process as u8)?;
-            Some((process, row.pid))
-        };
-        PATH.into_iter().filter_map(pid_of).collect()
-    }
-}
-
 /// What was measured of one way of scheduling.
 #[derive(Debug, Default)]
 struct Measured {
@@ -266,7 +136,7 @@ struct Measured {
 }
 
 fn measure(args: &PipelineArgs, scheduling: &Scheduling) -> Result<Measured, Failure> {
-    let mut drive = Drive::start(args, scheduling)?;
+    let mut drive = Drive::start(&args.scenario, &scheduling.stack())?;
     let (session, mut watch) = drive.join()?;
     let bare = create_bare(&session)?;
     let chain = Chain::start(&drive.instance, &scheduling.request)?;
@@ -304,36 +174,6 @@ fn create_bare(session: &Session) -> Result<BareServices, SessionError> {
     services.create::<Command>(session)?;
     services.create::<Actuator>(session)?;
     Ok(services)
-}
-
-/// What the kernel accounts to processes so far, and the readings they worked on.
-struct Account {
-    work: Vec<Nanos>,
-    readings: u64,
-}
-
-impl Account {
-    fn of(pids: &[(Process, u32)], readings: u64) -> Self {
-        Self { work: pids.iter().map(|(_, pid)| execution_time(*pid)).collect(), readings }
-    }
-
-    /// Work of each process per reading since `before` \[us\].
-    fn since(&self, before: &Self) -> Option<Vec<f64>> {
-        let readings = self.readings.checked_sub(before.readings).filter(|count| *count > 0)?;
-        #[allow(clippy::cast_precision_loss)] // far below 2^53
-        let each = |(now, before): (&Nanos, &Nanos)| {
-            now.saturating_sub(*before) as f64 / readings as f64 / 1e3
-        };
-        Some(self.work.iter().zip(&before.work).map(each).collect())
-    }
-}
-
-/// Time a process spent executing, in user code and in the kernel \[ns\].
-fn execution_time(pid: u32) -> Nanos {
-    let text = fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("schedstat"));
-    text.ok()
-        .and_then(|text| text.split_whitespace().next().and_then(|word| word.parse().ok()))
-        .unwrap_or(0)
 }
 
 /// What a slice of time gave: latencies, and work per reading by process in each window.
@@ -460,7 +300,8 @@ fn chain_places() -> Vec<Process> {
 }
 
 /// Median and 99th percentile of windows \[us\].
-fn ends(values: &[f64]) -> (f64, f64) {
+#[must_use]
+pub fn ends(values: &[f64]) -> (f64, f64) {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len().saturating_sub(1);

@@ -12,6 +12,8 @@ use clap::{Parser, Subcommand};
 use kerbside_messages::Process;
 use kerbside_runtime::Instance;
 
+pub use status::instance_of;
+
 use crate::calibrate::CalibrateArgs;
 use crate::compare::CompareVerb;
 use crate::diagnose::DiagnoseArgs;
@@ -21,6 +23,7 @@ use crate::replay::ReplayArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::service::{Service, ServiceArgs};
 use crate::simulate::SimulateArgs;
+use crate::tools;
 use crate::trial::TrialArgs;
 use crate::vehicle::VehicleArgs;
 use crate::{
@@ -72,6 +75,18 @@ enum Verb {
     /// Show each process and the mode, live from shared memory.
     #[command(after_help = "Example: kerbside status --json")]
     Status(status::StatusArgs),
+    /// List every topic with who takes part in it and how often it comes.
+    #[command(after_help = "Example: kerbside topics")]
+    Topics(tools::TopicsArgs),
+    /// Print the samples of a topic as they come.
+    #[command(after_help = "Example: kerbside echo odometry --fields x,y,yaw,state --count 5")]
+    Echo(tools::EchoArgs),
+    /// Measure how often topics come, how evenly, how old, and what of them is lost.
+    #[command(after_help = "Example: kerbside hz raw odometry command --window 5")]
+    Hz(tools::HzArgs),
+    /// Watch processes and topics; q quits. In a pipe: one table.
+    #[command(after_help = "Example: kerbside top --interval 0.5")]
+    Top(tools::TopArgs),
     /// Feed recorded readings through ingest and estimator, and say how far the odometry drifts.
     #[command(after_help = "Example: kerbside replay tests/data/cases/paper-1-6 --speed 10")]
     Replay(ReplayArgs),
@@ -143,10 +158,7 @@ enum ServiceVerb {
 /// [`Failure`] with its exit code.
 pub fn run(cli: &Cli) -> Result<Exit, Failure> {
     let level = cli.log.as_deref();
-    // A file that may not grow is an error to report, no reason to die.
-    let ignored = std::sync::Arc::default();
-    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
-        .map_err(Failure::internal)?;
+    outlive_file_limits()?;
     match &cli.verb {
         Verb::Park(args) => {
             let level = level.unwrap_or("warn");
@@ -198,6 +210,7 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             kerbside_runtime::end_on_broken_pipe();
             operate(&cli.verb)
         }
+        Verb::Topics(_) | Verb::Echo(_) | Verb::Hz(_) | Verb::Top(_) => look(&cli.verb, level),
         Verb::Config(verb) => {
             logging::start("config", level.unwrap_or("warn"), false);
             kerbside_runtime::end_on_broken_pipe();
@@ -208,6 +221,25 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             kerbside_runtime::end_on_broken_pipe();
             recording::run(verb)
         }
+    }
+}
+
+/// A file that may not grow is an error to report, no reason to die.
+fn outlive_file_limits() -> Result<(), Failure> {
+    let ignored = std::sync::Arc::default();
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, ignored)
+        .map(|_| ())
+        .map_err(Failure::internal)
+}
+
+fn look(verb: &Verb, level: Option<&str>) -> Result<Exit, Failure> {
+    logging::start("operator", level.unwrap_or("warn"), false);
+    match verb {
+        Verb::Topics(args) => tools::topics(args),
+        Verb::Echo(args) => tools::echo(args),
+        Verb::Hz(args) => tools::hz(args),
+        Verb::Top(args) => tools::top(args),
+        _ => Err(Failure::internal("not a tool")),
     }
 }
 

@@ -3,7 +3,7 @@
 //! It makes a pseudo-terminal, links its line end in the instance's folder, and drives on its own clock whether
 //! anybody listens or not. Topics out: `truth`, while there is a supervisor.
 
-pub(crate) mod pty;
+pub mod pty;
 mod reporter;
 mod stage;
 
