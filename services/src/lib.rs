@@ -5,6 +5,7 @@
 
 pub mod actuation;
 pub mod bench;
+pub mod bindings;
 pub mod calibrate;
 pub mod children;
 pub mod commands;

@@ -12,13 +12,15 @@ use kerbside_messages::topics::{Delivery, Publisher, TABLE, Topic};
 use crate::{assert_none, root};
 
 /// Pages for people.
-const PAGES: [&str; 6] = [
+const PAGES: [&str; 8] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "deploy/README.md",
+    "docs/bindings.md",
     "docs/run-folders.md",
     "deploy/examples/microcontroller/README.md",
+    "deploy/examples/python/README.md",
 ];
 
 const TABLE_BEGIN: &str =

@@ -14,6 +14,7 @@ use kerbside_runtime::Instance;
 
 pub use status::instance_of;
 
+use crate::bindings::BindingsVerb;
 use crate::calibrate::CalibrateArgs;
 use crate::compare::CompareVerb;
 use crate::diagnose::DiagnoseArgs;
@@ -119,6 +120,12 @@ enum Verb {
     /// Measure hops, the pipeline and the start, and hold them against limits.
     #[command(subcommand, after_help = "Example: kerbside bench transport --json")]
     Bench(crate::bench::BenchVerb),
+    /// Print the layouts of all messages for another language.
+    #[command(
+        subcommand,
+        after_help = "Example: kerbside bindings python --out kerbside_messages.py"
+    )]
+    Bindings(BindingsVerb),
     /// Run one process of a stack; the supervisor starts them by itself.
     #[command(subcommand, after_help = "Example: kerbside service tracker --instance bay2")]
     Service(ServiceVerb),
@@ -216,6 +223,7 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             kerbside_runtime::end_on_broken_pipe();
             config::run(verb)
         }
+        Verb::Bindings(verb) => crate::bindings::run(verb),
         Verb::Recording(verb) => {
             logging::start("recording", level.unwrap_or("warn"), false);
             kerbside_runtime::end_on_broken_pipe();
