@@ -220,3 +220,41 @@ fn chunks_are_as_the_configuration_says() {
     assert!(report.chunks as f64 > 5.0 * seconds, "{} chunks in {seconds} s", report.chunks);
     sandbox.assert_empty();
 }
+
+#[test]
+fn recordings_are_cut_and_the_oldest_give_way() {
+    let sandbox = Sandbox::new();
+    let folder = sandbox.file("recordings");
+    std::fs::create_dir(&folder).unwrap();
+    let others = folder.join("other-1700000000-1.mcap");
+    std::fs::write(&others, vec![0; 400_000]).unwrap();
+    let content = format!(
+        "vehicle = \"paper-1-6\"\n[recorder]\nchunk_size = 8192\ncompression = \"none\"\n\
+         file_bytes = 1000000\nkeep_bytes = 3000000\nfolder = \"{}\"\n",
+        folder.display()
+    );
+    let config = file(&sandbox, "stack.toml", &content);
+    let up = ["up", "--simulate", "--instance", "one", "--config", config.to_str().unwrap()];
+    let stack = Running::start(&sandbox, "up", &up);
+    until_mode(&sandbox, "ready");
+    let ours = || {
+        let entries = std::fs::read_dir(&folder).unwrap().flatten();
+        let named = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with("one-"));
+        named.map(|entry| entry.path()).collect::<Vec<_>>()
+    };
+    // A second of it has about a megabyte: the first file has to go after three.
+    let first = poll(PATIENCE, || ours().first().cloned()).unwrap();
+    assert!(poll(PATIENCE, || (!first.exists()).then_some(())).is_some(), "{:?}", ours());
+    assert_eq!(run(&sandbox, &["down"]).code, Some(0));
+    assert_eq!(stack.end().code, Some(0));
+    let left = ours();
+    let bytes: u64 = left.iter().map(|path| path.metadata().unwrap().len()).sum();
+    assert!(bytes < 6_000_000 && left.len() >= 2, "{bytes} bytes in {left:?}");
+    for path in &left {
+        let report = check(path).unwrap();
+        assert!(report.is_sound(), "{}: {:?}", path.display(), report.problems());
+        assert!(report.messages() > 0);
+    }
+    assert!(others.exists(), "another instance's is nobody's business");
+    sandbox.assert_empty();
+}

@@ -2,22 +2,23 @@
 //!
 //! Topics in: every recorded topic of the table. It polls, so that no publisher pays for it; the subscribers' buffers
 //! hold what comes while the disk is busy. A disk that is full, or too slow even for them, costs the recording alone,
-//! and `status` says so.
+//! and `status` says so. A file that has grown as large as the configuration allows is closed and the next one begun.
+
+mod disk;
+mod kept;
 
 use core::cell::Cell;
 use core::time::Duration;
-use std::fs::{self, File};
-use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use kerbside_messages::{
     Actuator, Command, Fix, Header, Heartbeat, Inhibit, Message, Odometry, Permit, Process, Raw,
     Restore, State, Travel, Truth,
 };
-use kerbside_recordings::recording::{Chunks, Provenance, RecordingWriter, WriteError};
+use kerbside_recordings::recording::WriteError;
 use kerbside_runtime::{PlanSubscriber, Session, SessionError, Subscriber, Ticker, depth, now};
-use kerbside_settings::Compression;
 
+use self::disk::{Disk, Writer};
 use crate::exit::{Exit, Failure};
 use crate::life::{self, Service, Worker};
 use crate::replay::Uptaker;
@@ -35,8 +36,6 @@ pub fn run(service: &Service) -> Result<Exit, Failure> {
     life::run_with_worker(service, Recorder::open, |recorder, worker| recorder.record(worker))
 }
 
-/// A recording in a file.
-type Writer = RecordingWriter<File>;
 /// One topic's way into the recording; tells how many of its samples were overwritten before they got there.
 type Feed = Box<dyn FnMut(&mut Writer) -> Result<u64, WriteError>>;
 
@@ -45,29 +44,26 @@ struct Recorder {
     poll: Ticker,
     disk: Disk,
     lost: u64,
+    /// A new file was begun: the standing plan is to be written into it.
+    restate_plan: Rc<Cell<bool>>,
     /// Sequence of the newest odometry taken in.
     taken: Rc<Cell<u64>>,
     /// In a replay, where that is told.
     uptaker: Option<Uptaker>,
 }
 
-/// The file, while it can be written.
-enum Disk {
-    Open { writer: Box<Writer>, path: PathBuf },
-    Failed { why: String },
-}
-
 impl Recorder {
     fn open(session: &Session, service: &Service) -> Result<Self, SessionError> {
         let taken = Rc::new(Cell::new(0));
         let newest = Rc::clone(&taken);
+        let restate_plan = Rc::new(Cell::new(false));
         let mut feeds = vec![
             raw_feed(session, service)?,
             feed::<Travel>(session, None)?,
             feed_seen::<Odometry>(session, None, move |header| newest.set(header.sequence))?,
             feed::<Restore>(session, None)?,
             feed::<Fix>(session, None)?,
-            plan_feed(session)?,
+            plan_feed(session, Rc::clone(&restate_plan))?,
             feed::<Command>(session, None)?,
             feed::<Permit>(session, None)?,
             feed::<Inhibit>(session, None)?,
@@ -82,7 +78,7 @@ impl Recorder {
         let replays = service.replays();
         let uptaker = replays.then(|| Uptaker::open(session, Process::Recorder)).transpose()?;
         let poll = Ticker::new(if replays { REPLAY_POLL } else { POLL });
-        Ok(Self { feeds, poll, disk, lost: 0, taken, uptaker })
+        Ok(Self { feeds, poll, disk, lost: 0, restate_plan, taken, uptaker })
     }
 
     fn record(&mut self, worker: &Worker) {
@@ -91,27 +87,33 @@ impl Recorder {
         self.take_in(worker);
         if let Some(uptaker) = &mut self.uptaker {
             // Where nothing is recorded any more, nobody needs to wait for it.
-            let recording = matches!(self.disk, Disk::Open { .. });
-            uptaker.tell(if recording { self.taken.get() } else { u64::MAX });
+            uptaker.tell(if self.disk.is_open() { self.taken.get() } else { u64::MAX });
         }
     }
 
     fn take_in(&mut self, worker: &Worker) {
-        match &mut self.disk {
-            Disk::Open { writer, path } => match take_in(&mut self.feeds, writer) {
-                Ok(lost) if lost > self.lost => {
+        let Some(writer) = self.disk.writer() else {
+            worker.says(self.disk.why());
+            return;
+        };
+        match take_in(&mut self.feeds, writer) {
+            Ok(lost) => {
+                if lost > self.lost {
                     self.lost = lost;
                     tracing::warn!(lost, "samples came faster than the disk takes them");
                     worker.says(&format!("{lost} samples lost: the disk is slow"));
                 }
-                Ok(_) => {}
-                Err(error) => {
-                    tracing::error!(path = %path.display(), %error, "recording ends here; everything else goes on");
-                    self.disk = Disk::Failed { why: format!("recording ended: {}", short(&error)) };
-                }
-            },
-            Disk::Failed { why } => worker.says(why),
+                // A file of its own needs the plan that stands, too.
+                self.restate_plan.set(self.disk.begin_next_if_full());
+            }
+            Err(error) => self.disk.fail(&error),
         }
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        self.disk.close(self.lost);
     }
 }
 
@@ -123,94 +125,6 @@ fn take_in(feeds: &mut [Feed], writer: &mut Writer) -> Result<u64, WriteError> {
     }
     writer.close_chunk_if_older(now())?;
     Ok(lost)
-}
-
-/// The error in the few words that a heartbeat has room for.
-fn short(error: &WriteError) -> String {
-    match error {
-        WriteError::DiskFull(_) => "the disk is full".to_owned(),
-        WriteError::FileTooLarge(_) => "the file may not grow".to_owned(),
-        WriteError::Io(error) => error.kind().to_string(),
-        other => other.to_string(),
-    }
-}
-
-impl Drop for Recorder {
-    fn drop(&mut self) {
-        let Disk::Open { writer, path } = &mut self.disk else { return };
-        match writer.finish() {
-            Ok(closed) => {
-                let (messages, chunks, lost) = (closed.messages, closed.chunks, self.lost);
-                tracing::info!(path = %path.display(), messages, chunks, lost, "recording closed");
-            }
-            Err(error) => {
-                tracing::error!(path = %path.display(), %error, "recording not closed; recording recover reads it");
-            }
-        }
-    }
-}
-
-impl Disk {
-    fn create(service: &Service) -> Self {
-        let path = free_path(&recording_path(service));
-        let opened = path.parent().map_or(Ok(()), fs::create_dir_all).map_err(WriteError::from);
-        let opened = opened.and_then(|()| {
-            RecordingWriter::create_in_chunks(&path, &provenance(service), now(), chunks(service))
-        });
-        match opened {
-            Ok(writer) => {
-                tracing::info!(path = %path.display(), "recording");
-                Self::Open { writer: Box::new(writer), path }
-            }
-            Err(error) => {
-                tracing::error!(path = %path.display(), %error, "no recording; everything else goes on");
-                Self::Failed { why: format!("no recording: {}", short(&error)) }
-            }
-        }
-    }
-}
-
-fn chunks(service: &Service) -> Chunks {
-    let settings = &service.stack.recorder;
-    Chunks {
-        bytes: settings.chunk_size as usize,
-        compressed: settings.compression == Compression::Lz4,
-    }
-}
-
-/// Where to record: as asked for, else in the configured folder, else in the user's state folder.
-fn recording_path(service: &Service) -> PathBuf {
-    if let Some(path) = &service.args.recording {
-        return path.clone();
-    }
-    let folder = service
-        .stack
-        .recorder
-        .folder
-        .clone()
-        .unwrap_or_else(|| crate::output::state_folder().join("recordings"));
-    folder.join(format!("{}-{}.mcap", service.instance.name(), crate::output::stamp()))
-}
-
-/// A restarted recorder must not overwrite what its predecessor saved.
-fn free_path(path: &Path) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let numbered = |number: u32| path.with_file_name(format!("{stem}-{number}.mcap"));
-    core::iter::once(path.to_owned())
-        .chain((2..).map(numbered))
-        .find(|path| !path.exists())
-        .unwrap_or_default()
-}
-
-fn provenance(service: &Service) -> Provenance {
-    Provenance {
-        version: Some(env!("CARGO_PKG_VERSION").to_owned()),
-        instance: Some(service.instance.name().to_owned()),
-        scenario: service.args.scenario.clone(),
-        vehicle: Some(service.stack.vehicle_text.clone()),
-        stack: Some(service.stack_text.clone()),
-        ..Provenance::default()
-    }
 }
 
 fn feed<M: Message>(session: &Session, process: Option<Process>) -> Result<Feed, SessionError> {
@@ -242,10 +156,10 @@ fn raw_feed(session: &Session, service: &Service) -> Result<Feed, SessionError> 
     Ok(Box::new(move |writer| Ok(counts * raw(writer)?)))
 }
 
-fn plan_feed(session: &Session) -> Result<Feed, SessionError> {
+fn plan_feed(session: &Session, restate: Rc<Cell<bool>>) -> Result<Feed, SessionError> {
     let mut subscriber: PlanSubscriber = session.plan_subscriber()?;
     Ok(Box::new(move |writer| {
-        if subscriber.update()
+        if (subscriber.update() | restate.take())
             && let Some((head, points)) = subscriber.get()
         {
             writer.write_message(head, bytemuck::cast_slice(points), now())?;
@@ -283,28 +197,5 @@ mod tests {
             gaps.take(&Header { epoch, sequence, ..Header::default() });
         }
         assert_eq!(gaps.lost, 2 + 1);
-    }
-
-    #[test]
-    fn what_ends_a_recording_fits_a_heartbeat() {
-        let errors = [
-            std::io::ErrorKind::StorageFull,
-            std::io::ErrorKind::FileTooLarge,
-            std::io::ErrorKind::PermissionDenied,
-        ];
-        for kind in errors {
-            let words = format!("recording ended: {}", short(&std::io::Error::from(kind).into()));
-            assert!(words.len() <= Heartbeat::default().text.len(), "{words}");
-        }
-    }
-
-    #[test]
-    fn a_successor_takes_another_name() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("run.mcap");
-        assert_eq!(free_path(&path), path);
-        fs::write(&path, "").unwrap();
-        fs::write(folder.path().join("run-2.mcap"), "").unwrap();
-        assert_eq!(free_path(&path), folder.path().join("run-3.mcap"));
     }
 }

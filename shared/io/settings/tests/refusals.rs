@@ -270,6 +270,21 @@ fn periods_that_the_supervisor_cannot_resolve_are_refused() {
 }
 
 #[test]
+fn what_is_kept_of_recordings_has_room_for_two() {
+    let folder = Folder::new();
+    let kept = "enabled = true\nfile_bytes = 1000000\nkeep_bytes = 1999999";
+    folder.change("stack.toml", "[recorder]\nenabled = true", &format!("[recorder]\n{kept}"));
+    let error = folder.sources().stack().unwrap_err();
+    let said = error.problems()[0].to_string();
+    for part in ["stack.toml:", "recorder.keep_bytes = 1999999", "out of range", "at least 2000000"]
+    {
+        assert!(said.contains(part), "no {part} in {said}");
+    }
+    folder.change("stack.toml", "keep_bytes = 1999999", "keep_bytes = 2000000");
+    assert_eq!(folder.sources().stack().unwrap().value.recorder.keep_bytes, Some(2_000_000));
+}
+
+#[test]
 fn problems_of_the_vehicle_come_with_the_stack() {
     let folder = Folder::new();
     folder.change("vehicles/paper-1-6.toml", "wheelbase = 0.50", "wheelbase = 0");

@@ -77,6 +77,7 @@ fn every_key_of_the_stack_arrives() {
         [timeouts]\nfreshness = 0.08\n[tracker]\ncorridor = 0.2\n[planner]\nsearch_nodes = 1234\n\
         [realtime]\nenabled = \"on\"\npriority = 80\nlock_memory = false\ncores = [2, 3]\n\
         [recorder]\nenabled = false\nchunk_size = 65536\ncompression = \"none\"\n\
+        file_bytes = 5000000000\nkeep_bytes = 20000000000\nkeep_days = 30\n\
         [log]\nlevel = \"warn\"\nformat = \"json\"\n[process.recorder]\nstart = \"external\"\n\
         [initial_pose]\nx = 1\ny = -2.5\nyaw_degrees = 180\n";
     let path = folder.path().join("all.toml");
@@ -99,6 +100,9 @@ fn every_key_of_the_stack_arrives() {
         folder: None,
         chunk_size: 65_536,
         compression: Compression::None,
+        file_bytes: 5_000_000_000,
+        keep_bytes: Some(20_000_000_000),
+        keep_days: Some(30),
     };
     assert_eq!(stack.recorder, recorder);
     assert_eq!(stack.log, LogSettings { level: LogLevel::Warn, format: LogFormat::Json });

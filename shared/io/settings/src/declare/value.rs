@@ -124,7 +124,7 @@ macro_rules! integers {
     )*};
 }
 
-integers!(u8, u32, usize);
+integers!(u8, u32, u64, usize);
 
 impl Field for bool {
     fn take(value: &Value) -> Option<Self> {

@@ -1,4 +1,5 @@
-//! What no single key can be wrong about: stopping in time, and periods that can be told apart.
+//! What no single key can be wrong about: stopping in time, periods that can be told apart, and recordings that fit
+//! where they are kept.
 
 use core::time::Duration;
 
@@ -33,6 +34,17 @@ pub(super) fn check(
                 report(reading, draft, vehicle, &error);
             }
         }
+    }
+    check_recordings(reading, &drafts[0]);
+}
+
+/// While one recording is written to its full size, another one is kept.
+fn check_recordings(reading: &mut Reading<'_, StackDraft>, draft: &StackDraft) {
+    let (file, Some(keep)) = (draft.recorder.file_bytes, draft.recorder.keep_bytes) else { return };
+    let least = file.saturating_mul(2);
+    if keep < least {
+        let allowed = format!("at least {least}, twice recorder.file_bytes");
+        reading.refuse("recorder.keep_bytes", &keep.to_string(), Cause::OutOfRange, allowed);
     }
 }
 

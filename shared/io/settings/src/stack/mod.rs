@@ -150,11 +150,25 @@ pub struct RecorderSettings {
     pub chunk_size: u32,
     /// Compression of chunks.
     pub compression: Compression,
+    /// Size at which a recording is closed and the next one begun \[byte\].
+    pub file_bytes: u64,
+    /// Most that the recordings of an instance take together \[byte\]; none: all are kept.
+    pub keep_bytes: Option<u64>,
+    /// Days after which a recording is removed; none: all are kept.
+    pub keep_days: Option<u32>,
 }
 
 impl Default for RecorderSettings {
     fn default() -> Self {
-        Self { enabled: true, folder: None, chunk_size: 262_144, compression: Compression::Lz4 }
+        Self {
+            enabled: true,
+            folder: None,
+            chunk_size: 262_144,
+            compression: Compression::Lz4,
+            file_bytes: 1_000_000_000,
+            keep_bytes: None,
+            keep_days: None,
+        }
     }
 }
 

@@ -6,6 +6,8 @@ use super::StackDraft;
 use crate::declare::{Kind, Schema};
 use crate::stack::{Compression, InterfaceKind, LogFormat, LogLevel, RealtimeMode, Start};
 
+/// Sizes of recordings: from much more than their schemas take to 1 TB.
+const BYTES: Kind = Kind::Integer { unit: "byte", low: 1_000_000, high: 1_000_000_000_000 };
 const CORE: Kind = Kind::Integer { unit: "", low: 0, high: 1023 };
 
 /// `[interface]`, `[line]`, `[realtime]`, `[recorder]`, `[log]` and `[process]`.
@@ -93,6 +95,29 @@ fn declare_recorder(schema: Schema<StackDraft>) -> Schema<StackDraft> {
             Kind::Choice(Compression::NAMES),
             "Compression of chunks.",
             |s| &mut s.recorder.compression,
+        )
+        .key(
+            "recorder.file_bytes",
+            BYTES,
+            "Size at which a recording is closed and the next one begun; one that --recording \
+             names goes on as it is.",
+            |s| &mut s.recorder.file_bytes,
+        )
+        .optional(
+            "recorder.keep_bytes",
+            BYTES,
+            "no recording is removed for its size",
+            "Most that the recordings of an instance take in the folder: the oldest are removed \
+             where the next one begins. At least twice recorder.file_bytes.",
+            |s| &mut s.recorder.keep_bytes,
+        )
+        .optional(
+            "recorder.keep_days",
+            Kind::Integer { unit: "day", low: 1, high: 36_500 },
+            "no recording is removed for its age",
+            "Recordings of the instance that were last written before so many days are removed \
+             where the next one begins.",
+            |s| &mut s.recorder.keep_days,
         )
 }
 
