@@ -301,3 +301,25 @@ fn debug_output_does_not_pass_for_prose() {
     let stderr = "thread 'main' panicked at src/x.rs".to_owned();
     Said { code: Some(75), stdout: String::new(), stderr }.refuses(75, &[]);
 }
+
+#[test]
+fn a_simulated_vehicle_differs_from_its_description_where_up_is_told_so() {
+    let sandbox = Sandbox::new();
+    let overlay = file(&sandbox, "e.toml", "[[effect]]\nid = \"radius_scale\"\nscale = 1.02\n");
+    let overlay = overlay.to_str().unwrap();
+    let up = |more: &[&str]| run(&sandbox, &[&["up", "--instance", "one"], more].concat());
+    up(&["--effects", overlay]).refuses(2, &["--effects and --plant are for --simulate"]);
+    let wrong = file(&sandbox, "w.toml", "[[effect]]\nid = \"radius_scal\"\nscale = 1.02\n");
+    let wrong = wrong.to_str().unwrap();
+    up(&["--simulate", "--effects", wrong]).refuses(78, &["w.toml", "radius_scal"]);
+    up(&["--simulate", "--plant", "paper-1-7"]).refuses(78, &["paper-1-7", "paper-1-6"]);
+    let arguments = ["up", "--simulate", "--instance", "one", "--effects", overlay];
+    let stack = common_cli::Running::start(&sandbox, "up", &arguments);
+    common_cli::until_mode(&sandbox, "ready");
+    let vehicle = sandbox.processes().into_iter().find(|(_, line)| line.contains(" vehicle "));
+    let (_, line) = vehicle.expect("a simulated vehicle");
+    assert!(line.contains(&format!("--effects {overlay}")), "{line}");
+    assert_eq!(run(&sandbox, &["down"]).code, Some(0));
+    assert_eq!(stack.end().code, Some(0));
+    sandbox.assert_empty();
+}

@@ -5,7 +5,7 @@ mod drift;
 mod fit;
 mod input;
 mod judge;
-mod output;
+pub(crate) mod output;
 mod report;
 mod split;
 mod summary;

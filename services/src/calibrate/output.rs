@@ -63,7 +63,7 @@ fn path_of(parameter: Parameter) -> Vec<&'static str> {
 }
 
 /// Puts `value` at `path`, keeping the space and the comments around what was there; tables that are missing are made.
-fn put(table: &mut dyn toml_edit::TableLike, path: &[&str], mut value: Value) {
+pub(crate) fn put(table: &mut dyn toml_edit::TableLike, path: &[&str], mut value: Value) {
     let [name, rest @ ..] = path else { return };
     if !rest.is_empty() {
         let item = table.entry(name).or_insert_with(|| {
@@ -89,7 +89,7 @@ fn put(table: &mut dyn toml_edit::TableLike, path: &[&str], mut value: Value) {
 }
 
 /// A number that stays a number with a point.
-fn number(value: f64) -> Value {
+pub(crate) fn number(value: f64) -> Value {
     Value::Float(Formatted::new(value))
 }
 
@@ -100,7 +100,7 @@ fn rounded(estimate: &Estimate) -> f64 {
 }
 
 /// `value` to the decimal place of `step`.
-fn significant(value: f64, step: f64) -> f64 {
+pub(crate) fn significant(value: f64, step: f64) -> f64 {
     if !(step > 0.0 && step.is_finite()) {
         return value;
     }

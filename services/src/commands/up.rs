@@ -13,7 +13,7 @@ use kerbside_runtime::{FileLock, Ticker, now};
 use super::DEFAULT_INSTANCE;
 use crate::exit::{Exit, Failure};
 use crate::service::{Service, ServiceArgs};
-use crate::vehicle::{format_pose, parse_pose};
+use crate::vehicle::{PlantArgs, format_pose, parse_pose};
 use crate::{parent, realtime, supervisor};
 
 /// Longest wait for the vehicle's orderly end.
@@ -36,6 +36,8 @@ pub struct UpArgs {
     /// Seed of the simulated vehicle's noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    plant: PlantArgs,
     /// End together with the process that started this one.
     #[arg(long, value_name = "PID", hide = true)]
     with_parent: Option<u32>,
@@ -46,6 +48,9 @@ pub struct UpArgs {
 /// # Errors
 /// [`Failure`] where the configuration is refused or the instance is busy.
 pub fn run(args: &UpArgs, level: Option<&str>) -> Result<Exit, Failure> {
+    if args.plant.is_given() && !args.simulate {
+        return Err(Failure::new(Exit::Usage, "--effects and --plant are for --simulate"));
+    }
     let mut service = Service::load(Process::Supervisor, &args.service, DEFAULT_INSTANCE)?;
     super::start_log(&service, level);
     if let Some(parent) = args.with_parent {
@@ -79,7 +84,18 @@ fn start_vehicle(args: &UpArgs, service: &Service) -> Result<Option<Child>, Fail
             "instance {name} is already supervised by process {pid}"
         )));
     }
+    // Refused here, where a person reads it.
+    args.plant.load(service)?;
     if let Some(pid) = vehicle_of(service) {
+        if args.plant.is_given() {
+            return Err(Failure::with_help(
+                Exit::Unavailable,
+                format!(
+                    "the instance still has a simulated vehicle, process {pid}, of its own kind"
+                ),
+                "kerbside up --simulate without --effects and --plant goes on with it; or end it first",
+            ));
+        }
         tracing::info!(pid, "the instance has a simulated vehicle");
         return Ok(None);
     }
@@ -89,6 +105,7 @@ fn start_vehicle(args: &UpArgs, service: &Service) -> Result<Option<Child>, Fail
         .args(["service", "vehicle"])
         .args(service.arguments())
         .args(["--start", &format_pose(&args.start), "--seed", &args.seed.to_string()])
+        .args(args.plant.arguments())
         .arg("--with-stack")
         .stdin(Stdio::null())
         .stdout(Stdio::null())

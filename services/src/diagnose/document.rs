@@ -9,6 +9,8 @@ use serde_json::{Map, Value, json};
 pub const DIAGNOSIS: &str = "diagnosis.json";
 /// Effects, ready for the simulator.
 pub const OVERLAY: &str = "diagnosis.overlay.toml";
+/// The vehicle's file with what it can absorb.
+pub const VEHICLE: &str = "diagnosis.vehicle.toml";
 /// Commands of the next manoeuvre.
 pub const NEXT: &str = "next.csv";
 /// For people.
@@ -205,7 +207,7 @@ fn verdict_in_words(found: &Diagnosis) -> String {
 }
 
 /// A comment ends where its line does.
-fn one_line(text: &str) -> String {
+pub fn one_line(text: &str) -> String {
     text.chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
 }
 

@@ -5,9 +5,8 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::Diagnosed;
-use super::document::{self, DIAGNOSIS, NEXT, OVERLAY, REPORT};
-use super::report;
+use super::document::{self, DIAGNOSIS, NEXT, OVERLAY, REPORT, VEHICLE};
+use super::{Diagnosed, absorbed, report};
 use crate::exit::{Exit, Failure};
 use crate::output;
 
@@ -22,6 +21,10 @@ pub fn write(folder: &Path, diagnosed: &Diagnosed, command_line: &str) -> Result
     let found = &diagnosed.found;
     if !found.effects.is_empty() {
         output::write(&folder.join(OVERLAY), &document::overlay(found))?;
+    }
+    let absorbed = diagnosed.absorbed();
+    if !absorbed.lines.is_empty() {
+        output::write(&folder.join(VEHICLE), &absorbed::text(diagnosed, &absorbed)?)?;
     }
     if let Some(next) = found.next.as_ref().filter(|next| !next.commands.is_empty()) {
         output::write(&folder.join(NEXT), &document::commands(next))?;
@@ -39,7 +42,7 @@ pub fn write(folder: &Path, diagnosed: &Diagnosed, command_line: &str) -> Result
 /// # Errors
 /// [`Failure`] naming what cannot be taken away.
 pub fn clear(folder: &Path) -> Result<(), Failure> {
-    for name in [DIAGNOSIS, OVERLAY, NEXT, REPORT] {
+    for name in [DIAGNOSIS, OVERLAY, VEHICLE, NEXT, REPORT] {
         match fs::remove_file(folder.join(name)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                 return Err(refused(&folder.join(name), &error));

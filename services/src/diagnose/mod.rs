@@ -1,6 +1,7 @@
 //! `diagnose`: where the gap between simulator and vehicle lies, which effect causes it, how far it shrinks once that
 //! effect is added, how sure that is, and what to drive next. Of one case, or of many.
 
+mod absorbed;
 mod batch;
 mod document;
 mod files;
@@ -23,6 +24,7 @@ use kerbside_diagnosis::{Case, Diagnosis, Settings};
 use kerbside_settings::load_overlay;
 use serde_json::Value;
 
+use absorbed::Absorbed;
 pub use batch::Shard;
 pub use input::Input;
 
@@ -44,8 +46,8 @@ pub struct DiagnoseArgs {
     /// Diagnose what is diagnosed already, too.
     #[arg(long, requires = "batch")]
     pub fresh: bool,
-    /// Folder for diagnosis.json, diagnosis.overlay.toml, report.html and next.csv; of a batch one per case in it, and
-    /// a table. A new one in the state folder where not given.
+    /// Folder for diagnosis.json, diagnosis.overlay.toml, diagnosis.vehicle.toml, report.html and next.csv; of a batch
+    /// one per case in it, and a table. A new one in the state folder where not given.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Overlay: show how far the gap shrinks with these effects in place of those that are found.
@@ -88,7 +90,14 @@ impl Diagnosed {
     fn document(&self) -> Value {
         let (notices, model) = (&self.input.notices[..], self.model.as_deref());
         let facts = document::Facts { notices, model, seconds: self.seconds };
-        document::of(&self.found, &facts)
+        let mut document = document::of(&self.found, &facts);
+        document["vehicle"] = self.absorbed().as_json(document::VEHICLE);
+        document
+    }
+
+    /// What of it the vehicle's file can absorb.
+    fn absorbed(&self) -> Absorbed {
+        Absorbed::of(&self.found, &self.input.case.vehicle)
     }
 }
 

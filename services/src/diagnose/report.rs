@@ -3,7 +3,7 @@
 use kerbside_reports::{DiagnoseReport, Provenance};
 
 use super::Diagnosed;
-use super::document::{NEXT, OVERLAY};
+use super::document::{NEXT, OVERLAY, VEHICLE};
 
 /// The report of `diagnosed`.
 pub fn of(diagnosed: &Diagnosed, command_line: &str) -> DiagnoseReport {
@@ -15,7 +15,12 @@ pub fn of(diagnosed: &Diagnosed, command_line: &str) -> DiagnoseReport {
         runs: input.case.runs.iter().map(|run| run.name.clone()).collect(),
         overlay: file(!found.effects.is_empty(), OVERLAY),
         next_file: file(found.next.as_ref().is_some_and(|next| !next.commands.is_empty()), NEXT),
-        notes: input.notices.clone(),
+        notes: input
+            .notices
+            .iter()
+            .cloned()
+            .chain(diagnosed.absorbed().in_words(VEHICLE))
+            .collect(),
         provenance: Provenance {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             command_line: command_line.to_owned(),

@@ -6,7 +6,7 @@ use kerbside_diagnosis::{Diagnosis, FoundEffect, LinkGap, Shrinkage, Verdict};
 use kerbside_reports::format;
 use serde_json::{Value, json};
 
-use super::document::{NEXT, OVERLAY, REPORT};
+use super::document::{NEXT, OVERLAY, REPORT, VEHICLE};
 use super::{DiagnoseArgs, Diagnosed};
 
 /// Columns of a terminal that everything but paths keeps to.
@@ -28,6 +28,9 @@ pub fn tell(args: &DiagnoseArgs, diagnosed: &Diagnosed, mut document: Value, fol
     let file = |name: &str, file: &str| println!("{name:NAME$}{}", folder.join(file).display());
     if !found.effects.is_empty() {
         file("overlay", OVERLAY);
+    }
+    if !diagnosed.absorbed().lines.is_empty() {
+        file("vehicle", VEHICLE);
     }
     if found.next.as_ref().is_some_and(|next| !next.commands.is_empty()) {
         file("commands", NEXT);
@@ -65,6 +68,9 @@ fn page(diagnosed: &Diagnosed) -> String {
         let sets: Vec<String> = next.separates.iter().map(|set| set.join(" + ")).collect();
         let sigma = format!("{:.1} standard deviations", next.sigma);
         say("next", &format!("{}: separates {} by {sigma}", next.manoeuvre, sets.join(" from ")));
+    }
+    if let Some(words) = diagnosed.absorbed().in_words(VEHICLE) {
+        say("way back", &words);
     }
     let notices = found.notices.iter().chain(&diagnosed.input.notices);
     notices.for_each(|notice| say("note", notice));

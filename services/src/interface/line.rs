@@ -8,6 +8,7 @@
 use std::os::fd::AsFd;
 use std::path::PathBuf;
 
+use kerbside_geometry::Actuators;
 use kerbside_line::{Frame, HostEnd, HostEvent, Reading};
 use kerbside_messages::{Actuator, Header, Nanos, Raw};
 use kerbside_runtime::{Newest, Publisher, now, poll_readable};
@@ -25,11 +26,18 @@ const WAIT: Nanos = 5_000_000;
 #[derive(Clone, Debug, Default)]
 pub struct LineStage {
     end: HostEnd,
+    actuators: Actuators,
     sent: Option<(u64, u64)>,
     heard: Option<Nanos>,
 }
 
 impl LineStage {
+    /// The line to a vehicle whose actuators respond like this.
+    #[must_use]
+    pub fn new(actuators: Actuators) -> Self {
+        Self { actuators, ..Self::default() }
+    }
+
     /// Takes bytes that arrived at `now`; calls `reading` for each reading, `news` for everything else.
     pub fn receive(
         &mut self,
@@ -54,8 +62,10 @@ impl LineStage {
         if self.sent == Some(id) || now.saturating_sub(actuator.header.sent) > freshness {
             return None;
         }
+        // The gate speaks of the vehicle's motion, the line of what its actuators are told.
+        let (speed, steering) = self.actuators.command(actuator.speed, actuator.steering);
         #[allow(clippy::cast_possible_truncation)] // the line carries single precision
-        let frame = self.end.command(actuator.speed as f32, actuator.steering as f32)?;
+        let frame = self.end.command(speed as f32, steering as f32)?;
         self.sent = Some(id);
         Some(frame)
     }
@@ -184,7 +194,7 @@ pub fn run(service: &Service) -> Result<Exit, Failure> {
     let listener = life.listener::<Actuator>()?;
     let (device, baud) = device_of(service);
     let mut door = Door::new(device, baud);
-    let mut stage = LineStage::default();
+    let mut stage = LineStage::new(service.vehicle.response());
     let mut buffer = [0; 4096];
     while life.goes_on() {
         door.open(now());

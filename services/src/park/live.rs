@@ -42,9 +42,7 @@ pub fn run(job: &Job, progress: &Progress) -> Result<Run, Failure> {
     let pose = format_pose(&start.truth);
     let mut vehicle =
         ["--start", &pose, "--seed", &job.seed.to_string()].map(OsString::from).to_vec();
-    if let Some(effects) = &job.effects {
-        vehicle.extend(["--effects".into(), effects.into()]);
-    }
+    vehicle.extend(job.plant_arguments.iter().cloned());
     let mut stack = Children::start(&job.service, Some(&vehicle))?;
     let session = stack.join(&stop)?;
     let mut desk = Desk::open(&session, job)?;

@@ -9,17 +9,18 @@ pub mod simulated;
 mod summary;
 pub mod trace;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use kerbside_messages::{Nanos, Plan, Process, TrajectoryPoint};
 use kerbside_runtime::Instance;
-use kerbside_settings::{Scenario, load_overlay};
-use kerbside_simulation::Overlay;
+use kerbside_settings::Scenario;
 
 use crate::exit::{Exit, Failure};
 use crate::lockstep::Script;
 use crate::manoeuvre::End;
 use crate::service::{Service, ServiceArgs};
+use crate::vehicle::{Plant, PlantArgs};
 use crate::{configuration, output};
 use judge::{Verdict, judge};
 use progress::Progress;
@@ -45,9 +46,9 @@ pub struct ParkArgs {
     /// Vehicle, in place of the scenario's: a file, or the name of a shipped one.
     #[arg(long, value_name = "FILE")]
     pub vehicle: Option<String>,
-    /// Overlay: effects by which the simulated vehicle differs from its description.
-    #[arg(long, value_name = "FILE")]
-    pub effects: Option<PathBuf>,
+    /// What is simulated.
+    #[command(flatten)]
+    pub plant: PlantArgs,
     /// Configuration: a stack's file, or a folder like config/.
     #[arg(long, value_name = "PATH")]
     pub config: Option<PathBuf>,
@@ -79,10 +80,10 @@ pub struct Job {
     pub seed: u64,
     /// Arm again after a fault.
     pub rearm: bool,
-    /// What the simulated vehicle differs by from its description.
-    pub overlay: Overlay,
-    /// The file that says so; none where it is as described.
-    pub effects: Option<PathBuf>,
+    /// What is simulated.
+    pub plant: Plant,
+    /// The same, as a child is told.
+    pub plant_arguments: Vec<OsString>,
     /// In one thread.
     pub lockstep: bool,
     /// Where to record; none in lockstep.
@@ -193,7 +194,6 @@ pub fn run_live(job: &Job) -> Result<Run, Failure> {
 pub fn job(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Job, Failure> {
     let parking =
         configuration::parking(args.config.as_deref(), &args.scenario, args.vehicle.as_deref())?;
-    let overlay = args.effects.as_deref().map(load_overlay).transpose()?.unwrap_or_default();
     let name = args.instance.clone().unwrap_or_else(|| Instance::fresh_name("park"));
     let recording = (!args.lockstep && parking.stack.value.recorder.enabled)
         .then(|| live::recording_in(folder));
@@ -209,13 +209,13 @@ pub fn job(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Job, Failure> {
         ..ServiceArgs::default()
     };
     let service = Service::load(Process::Operator, &service_args, &name)?;
+    let plant = args.plant.load(&service)?;
     Ok(Job {
         service,
         scenario: parking.scenario.value,
         seed,
         rearm: args.rearm,
-        overlay,
-        effects: args.effects.clone(),
+        plant_arguments: args.plant.arguments(),
         lockstep: args.lockstep,
         recording,
         command_line: command_line(args, seed),
@@ -225,8 +225,9 @@ pub fn job(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Job, Failure> {
             parking.stack.value.vehicle_file,
         ]
         .into_iter()
-        .chain(args.effects.as_ref().map(|effects| effects.display().to_string()))
+        .chain(plant.files.iter().cloned())
         .collect(),
+        plant,
     })
 }
 
@@ -236,7 +237,7 @@ fn command_line(args: &ParkArgs, seed: u64) -> String {
     words.extend(args.lockstep.then(|| "--lockstep".to_owned()));
     words.extend(args.rearm.then(|| "--rearm".to_owned()));
     words.extend(args.vehicle.as_ref().map(|vehicle| format!("--vehicle {vehicle}")));
-    words.extend(args.effects.as_ref().map(|effects| format!("--effects {}", effects.display())));
+    words.extend(args.plant.arguments().iter().map(|word| word.to_string_lossy().into_owned()));
     words.extend(args.config.as_ref().map(|config| format!("--config {}", config.display())));
     words.join(" ")
 }

@@ -1,7 +1,6 @@
 //! A run in lockstep.
 
 use kerbside_messages::{Nanos, Verb, nanos};
-use kerbside_simulation::Effects;
 
 use super::scene::Start;
 use super::trace::Trace;
@@ -23,8 +22,8 @@ pub fn run(job: &Job, script: Script) -> Result<Run, Failure> {
     let scenario = &job.scenario;
     let start = Start::draw(scenario, job.seed);
     let making = Making {
-        vehicle: job.service.vehicle.clone(),
-        effects: Effects::from(&job.overlay),
+        vehicle: job.plant.vehicle.clone(),
+        effects: job.plant.effects.clone(),
         start: start.truth,
         seed: job.seed,
         boot: 1,

@@ -8,6 +8,7 @@ use crate::exit::Failure;
 use crate::lockstep::Script;
 use crate::output;
 use crate::park::{self, ParkArgs};
+use crate::vehicle::PlantArgs;
 
 /// The scenes of the paper's Table 3, and the same again full size.
 const SCENES: [&str; 4] = ["garage", "parallel", "garage-full-size", "parallel-full-size"];
@@ -53,7 +54,7 @@ fn one_scene(
         runs,
         rearm: false,
         vehicle: None,
-        effects: None,
+        plant: PlantArgs::default(),
         config: None,
         instance: None,
         out: None,

@@ -23,7 +23,8 @@ pub(super) fn rotations(recorded: &Run, vehicle: &Vehicle) -> [Option<Series>; 4
         let rows = recorded.wheels.iter().flat_map(|table| &table.rows);
         let rows = rows.filter(|row| read(row.mask));
         let (t, speeds): (Vec<f64>, Vec<f64>) = rows.map(|row| (row.t, row.speeds[index])).unzip();
-        (!t.is_empty()).then(|| Series::from_speeds(t, &speeds, vehicle.radius[index]))
+        let used = vehicle.speed_radius[index].unwrap_or(vehicle.radius[index]);
+        (!t.is_empty()).then(|| Series::from_speeds(t, &speeds, used))
     })
 }
 

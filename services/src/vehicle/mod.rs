@@ -3,20 +3,19 @@
 //! It makes a pseudo-terminal, links its line end in the instance's folder, and drives on its own clock whether
 //! anybody listens or not. Topics out: `truth`, while there is a supervisor.
 
+pub(crate) mod plant;
 pub mod pty;
 mod reporter;
 mod stage;
 
 use std::os::fd::AsFd;
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use kerbside_geometry::{Pose, angle};
 use kerbside_messages::{Nanos, Process, Truth};
 use kerbside_runtime::{FileLock, Instance, LockError, Ticker, now, poll_readable};
-use kerbside_settings::load_overlay;
-use kerbside_simulation::Effects;
 
+pub use plant::{Plant, PlantArgs};
 pub use stage::{Making, VehicleStage};
 
 use crate::exit::{Exit, Failure};
@@ -45,9 +44,9 @@ pub struct VehicleArgs {
     /// Seed of its sensors' noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Overlay: effects by which it differs from its description.
-    #[arg(long, value_name = "FILE")]
-    pub effects: Option<PathBuf>,
+    /// What it is.
+    #[command(flatten)]
+    pub plant: PlantArgs,
     /// End together with the process that started this one.
     #[arg(long, value_name = "PID", hide = true)]
     pub with_parent: Option<u32>,
@@ -87,7 +86,7 @@ pub fn run(args: &VehicleArgs, service: Service) -> Result<Exit, Failure> {
     if let Some(parent) = args.with_parent {
         crate::parent::die_with_parent(parent);
     }
-    let overlay = args.effects.as_deref().map(load_overlay).transpose()?.unwrap_or_default();
+    let plant = args.plant.load(&service)?;
     let stop = stop_flag()?;
     service.instance.create_folder()?;
     let _lock = take_lock(&service)?;
@@ -96,8 +95,8 @@ pub fn run(args: &VehicleArgs, service: Service) -> Result<Exit, Failure> {
     // After the reporter's thread, which need not be in time.
     life::enter_realtime(&service, Process::Vehicle);
     let mut stage = VehicleStage::new(&Making {
-        vehicle: service.vehicle.clone(),
-        effects: Effects::from(&overlay),
+        vehicle: plant.vehicle,
+        effects: plant.effects,
         start: args.start,
         seed: args.seed,
         boot: boot_id(),

@@ -80,7 +80,7 @@ impl World {
         let now = self.now;
         match process {
             Process::Interface => {
-                self.stages.interface = Some(LineStage::default());
+                self.stages.interface = Some(LineStage::new(self.service.vehicle.response()));
                 self.channels.raw.restart(now);
             }
             Process::Ingest => {

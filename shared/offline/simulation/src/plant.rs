@@ -91,7 +91,7 @@ pub(crate) struct Patch {
 /// What is shown of the motion.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensors {
-    /// Nominal radii, through which wheel speeds are told \[m\].
+    /// Radii through which wheel speeds are told \[m\].
     pub(crate) radius: [f64; 4],
     /// Share of each wheel's rotation that is shown.
     pub(crate) kept: [f64; 4],
@@ -133,7 +133,7 @@ impl Plant {
         let sensor = vehicle.steering_sensor;
         Self {
             speed: Actuation {
-                gain: 1.0,
+                gain: response.speed_gain,
                 dead_zone: 0.0,
                 delay: response.speed_delay,
                 limit: limits.speed,
@@ -141,7 +141,7 @@ impl Plant {
                 rate_limit: limits.acceleration,
             },
             steering: Actuation {
-                gain: 1.0,
+                gain: response.steering_gain,
                 dead_zone: 0.0,
                 delay: response.steering_delay,
                 limit: limits.steering,
@@ -152,13 +152,11 @@ impl Plant {
             contact: Contact {
                 drive: vehicle.drive,
                 driven_radius: vehicle.driven_radius(),
-                radius: core::array::from_fn(|wheel| {
-                    vehicle.speed_radius[wheel].unwrap_or(vehicle.radius[wheel])
-                }),
+                radius: vehicle.radius,
                 wheelbase: vehicle.wheelbase,
                 track_front: vehicle.track_front,
                 track_rear: vehicle.track_rear,
-                offset: 0.0,
+                offset: response.steering_offset,
                 compliance: 0.0,
                 understeer: 0.0,
                 kept: 1.0,
@@ -169,11 +167,15 @@ impl Plant {
                 patch: Patch { x: 0.0, y: 0.0, radius: 0.0, kept: 1.0 },
             },
             sensors: Sensors {
-                radius: vehicle.radius,
+                radius: core::array::from_fn(|wheel| {
+                    vehicle.speed_radius[wheel].unwrap_or(vehicle.radius[wheel])
+                }),
                 kept: [1.0; 4],
                 encoder_delay: 0.0,
                 steering_gain: sensor.map_or(1.0, |sensor| sensor.gain),
-                steering_offset: sensor.map_or(0.0, |sensor| sensor.offset),
+                // The sensor sits at the rack, and its offset is stated for straight wheels.
+                steering_offset: sensor
+                    .map_or(0.0, |sensor| sensor.offset + sensor.gain * response.steering_offset),
                 gyro_gain: 1.0,
                 gyro_bias: 0.0,
                 reference_delay: 0.0,
@@ -230,5 +232,26 @@ impl Sensors {
     pub(crate) fn body(&self, shown: &Pose) -> Pose {
         let scale = self.reference_scale;
         Pose::new(shown.x / scale, shown.y / scale, shown.yaw).compose(&self.marker.inverse())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kerbside_geometry::{Pose, Vehicle};
+
+    use crate::{Noise, Simulator};
+
+    #[test]
+    fn reported_speeds_are_computed_with_the_vehicles_own_radii() {
+        let mut vehicle = Vehicle::paper_car();
+        vehicle.encoders = None;
+        // A calibration found the rear left wheel larger; the vehicle goes on with the radius that it had.
+        vehicle.speed_radius[2] = Some(vehicle.radius[2]);
+        vehicle.radius[2] *= 1.02;
+        let mut simulator = Simulator::new(&vehicle, Pose::default(), &Noise::NONE, 1);
+        simulator.command(0.0, 0.3, 0.0);
+        simulator.advance(5.0);
+        let [_, _, left, right] = simulator.reading().speeds;
+        assert!(right > 0.29 && (1.02 * left - right).abs() < 1e-6, "{left} and {right}");
     }
 }

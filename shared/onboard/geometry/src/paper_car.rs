@@ -32,6 +32,7 @@ impl Vehicle {
                 speed_lag: 0.10,
                 steering_delay: 0.02,
                 steering_lag: 0.05,
+                ..Actuators::default()
             }),
             encoders: Some(Encoders {
                 counts_per_revolution: [Some(2048.0); 4],

@@ -84,8 +84,8 @@ pub struct Limits {
     pub steering_rate: f64,
 }
 
-/// Nominal response of the actuators: a pure delay, then a first-order lag.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+/// Nominal response of the actuators: a gain, a pure delay, then a first-order lag.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Actuators {
     /// Delay of the speed \[s\].
     pub speed_delay: f64,
@@ -95,6 +95,35 @@ pub struct Actuators {
     pub steering_delay: f64,
     /// Time constant of the steering \[s\].
     pub steering_lag: f64,
+    /// Speed reached per speed commanded \[-\].
+    pub speed_gain: f64,
+    /// Angle of the rack reached per angle commanded \[-\].
+    pub steering_gain: f64,
+    /// By which the road wheels stand askew of the rack \[rad\].
+    pub steering_offset: f64,
+}
+
+impl Default for Actuators {
+    /// An ideal response.
+    fn default() -> Self {
+        Self {
+            speed_delay: 0.0,
+            speed_lag: 0.0,
+            steering_delay: 0.0,
+            steering_lag: 0.0,
+            speed_gain: 1.0,
+            steering_gain: 1.0,
+            steering_offset: 0.0,
+        }
+    }
+}
+
+impl Actuators {
+    /// What to command, so that the vehicle drives at `speed` \[m/s\] with its road wheels at `steering` \[rad\].
+    #[must_use]
+    pub fn command(&self, speed: f64, steering: f64) -> (f64, f64) {
+        (speed / self.speed_gain, (steering - self.steering_offset) / self.steering_gain)
+    }
 }
 
 /// The wheel encoders.

@@ -112,6 +112,7 @@ const UNCERTAIN: &[(&str, &str)] = &[
 const LENGTH: Kind = Kind::metres(Range::above(0.0).to(10_000.0));
 const OFFSET: Kind = Kind::metres(Range::from(0.0).to(10_000.0));
 const RATE: Kind = Kind::unit("Hz", Range::above(0.0).to(10_000.0));
+const GAIN: Kind = Kind::number(Range::above(0.0).to(100.0));
 const DELAY: Kind = Kind::seconds(Range::from(0.0).to(10.0));
 
 static SCHEMA: LazyLock<Schema<VehicleDraft>> = LazyLock::new(declare);
@@ -219,7 +220,7 @@ fn declare_motion(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {
         )
         .optional_section(
             "actuators",
-            "Nominal response: a pure delay, then a first-order lag. Absent: unknown.",
+            "Nominal response: a gain, a pure delay, then a first-order lag. Absent: unknown.",
         )
         .required("actuators.speed_delay", DELAY, "Delay of the speed.", |v| {
             &mut v.actuators.speed_delay
@@ -233,6 +234,24 @@ fn declare_motion(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {
         .required("actuators.steering_lag", DELAY, "Time constant of the steering.", |v| {
             &mut v.actuators.steering_lag
         })
+        .key(
+            "actuators.speed_gain",
+            GAIN,
+            "Speed reached per speed commanded; commands are divided by it.",
+            |v| &mut v.actuators.speed_gain,
+        )
+        .key(
+            "actuators.steering_gain",
+            GAIN,
+            "Angle of the rack reached per angle commanded; commands are divided by it.",
+            |v| &mut v.actuators.steering_gain,
+        )
+        .key(
+            "actuators.steering_offset",
+            Kind::radians(Range::from(-PI).to(PI)),
+            "By which the road wheels stand askew of the rack; taken from what is commanded.",
+            |v| &mut v.actuators.steering_offset,
+        )
 }
 
 fn declare_sensors(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {

@@ -81,6 +81,7 @@ fn described(dice: &mut Dice) -> Vehicle {
             speed_lag: rounded(dice.between(0.06, 0.25), 3),
             steering_delay: rounded(dice.between(0.01, 0.05), 3),
             steering_lag: rounded(dice.between(0.03, 0.1), 3),
+            ..Actuators::default()
         }),
         encoders: encoders(dice, wheelbase),
         steering_sensor: sensor(dice, 0.8)

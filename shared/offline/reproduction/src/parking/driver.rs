@@ -78,10 +78,9 @@ fn vehicle(chassis: &Chassis, sensors: &Sensors, knows_lag: bool) -> Vehicle {
     Vehicle {
         limits: Limits { steering, steering_rate: 1.0, ..vehicle.limits },
         actuators: Some(kerbside_geometry::Actuators {
-            speed_delay: 0.0,
             speed_lag: lag,
-            steering_delay: 0.0,
             steering_lag: lag,
+            ..kerbside_geometry::Actuators::default()
         }),
         ..vehicle
     }

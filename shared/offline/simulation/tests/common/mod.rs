@@ -108,6 +108,7 @@ fn vehicle(root: &Table) -> Vehicle {
             speed_lag: number(actuators, "speed_lag"),
             steering_delay: number(actuators, "steering_delay"),
             steering_lag: number(actuators, "steering_lag"),
+            ..Actuators::default()
         }),
         encoders: optional("encoders").map(|encoders| Encoders {
             counts_per_revolution: wheels(
