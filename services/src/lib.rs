@@ -12,6 +12,7 @@ pub mod commands;
 pub mod compare;
 pub mod configuration;
 pub mod diagnose;
+pub mod doctor;
 pub mod estimator;
 pub mod exit;
 pub mod figures;

@@ -12,12 +12,13 @@ use kerbside_messages::topics::{Delivery, Publisher, TABLE, Topic};
 use crate::{assert_none, root};
 
 /// Pages for people.
-const PAGES: [&str; 8] = [
+const PAGES: [&str; 9] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "deploy/README.md",
     "docs/bindings.md",
+    "deploy/fleet/README.md",
     "docs/run-folders.md",
     "deploy/examples/microcontroller/README.md",
     "deploy/examples/python/README.md",

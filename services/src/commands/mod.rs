@@ -1,8 +1,10 @@
 //! The command line: a file per verb.
 
+mod completions;
 mod config;
 mod fix;
 mod go;
+mod man;
 mod operator;
 mod recording;
 mod status;
@@ -18,6 +20,7 @@ use crate::bindings::BindingsVerb;
 use crate::calibrate::CalibrateArgs;
 use crate::compare::CompareVerb;
 use crate::diagnose::DiagnoseArgs;
+use crate::doctor::DoctorArgs;
 use crate::exit::{Exit, Failure};
 use crate::park::ParkArgs;
 use crate::replay::ReplayArgs;
@@ -126,6 +129,15 @@ enum Verb {
         after_help = "Example: kerbside bindings python --out kerbside_messages.py"
     )]
     Bindings(BindingsVerb),
+    /// Say what this machine has and lacks for kerbside, and what to do about it.
+    #[command(after_help = "Example: kerbside doctor --config /etc/kerbside/stack.toml")]
+    Doctor(DoctorArgs),
+    /// Print a shell's completions of every verb and option.
+    #[command(after_help = "Example: kerbside completions bash > ~/.bash_completion.d/kerbside")]
+    Completions(completions::CompletionsArgs),
+    /// Print the manual page, or write one per verb.
+    #[command(after_help = "Example: kerbside man --out ~/.local/share/man/man1")]
+    Man(man::ManArgs),
     /// Run one process of a stack; the supervisor starts them by itself.
     #[command(subcommand, after_help = "Example: kerbside service tracker --instance bay2")]
     Service(ServiceVerb),
@@ -218,16 +230,15 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             operate(&cli.verb)
         }
         Verb::Topics(_) | Verb::Echo(_) | Verb::Hz(_) | Verb::Top(_) => look(&cli.verb, level),
-        Verb::Config(verb) => {
-            logging::start("config", level.unwrap_or("warn"), false);
-            kerbside_runtime::end_on_broken_pipe();
-            config::run(verb)
-        }
         Verb::Bindings(verb) => crate::bindings::run(verb),
-        Verb::Recording(verb) => {
-            logging::start("recording", level.unwrap_or("warn"), false);
+        Verb::Config(_)
+        | Verb::Recording(_)
+        | Verb::Doctor(_)
+        | Verb::Completions(_)
+        | Verb::Man(_) => {
+            logging::start("kerbside", level.unwrap_or("warn"), false);
             kerbside_runtime::end_on_broken_pipe();
-            recording::run(verb)
+            tell(&cli.verb)
         }
     }
 }
@@ -248,6 +259,18 @@ fn look(verb: &Verb, level: Option<&str>) -> Result<Exit, Failure> {
         Verb::Hz(args) => tools::hz(args),
         Verb::Top(args) => tools::top(args),
         _ => Err(Failure::internal("not a tool")),
+    }
+}
+
+/// Verbs that need no stack: they tell of files and of the machine.
+fn tell(verb: &Verb) -> Result<Exit, Failure> {
+    match verb {
+        Verb::Config(verb) => config::run(verb),
+        Verb::Recording(verb) => recording::run(verb),
+        Verb::Doctor(args) => crate::doctor::run(args),
+        Verb::Completions(args) => completions::run(args),
+        Verb::Man(args) => man::run(args),
+        _ => Err(Failure::internal("not a verb that tells")),
     }
 }
 

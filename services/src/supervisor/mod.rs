@@ -6,6 +6,7 @@
 mod children;
 mod ports;
 mod sweeper;
+mod systemd;
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -21,6 +22,7 @@ use crate::life::{self, Service};
 use children::Children;
 use ports::Ports;
 use sweeper::Sweeper;
+use systemd::Systemd;
 
 /// Longest wait for what an earlier life left to end.
 const LEFTOVERS: Duration = Duration::from_secs(2);
@@ -83,7 +85,7 @@ struct Acting<'a> {
     sweeper: Sweeper,
     asked: BTreeMap<u64, Asked<OperatorRequest, OperatorAnswer>>,
     next_id: u64,
-    notified: Option<Mode>,
+    systemd: Systemd,
     finished: Option<u8>,
 }
 
@@ -102,7 +104,7 @@ impl<'a> Acting<'a> {
             sweeper: Sweeper::start(&service.instance)?,
             asked: BTreeMap::new(),
             next_id: 1,
-            notified: None,
+            systemd: Systemd::from_environment(),
             finished: None,
         })
     }
@@ -141,8 +143,8 @@ impl<'a> Acting<'a> {
                 break exit;
             }
         };
+        self.systemd.stopping();
         self.children.reap().await;
-        let _ = sd_notify::notify(&[sd_notify::NotifyState::Stopping]);
         Ok(if exit == 0 { Exit::Good } else { Exit::Bad })
     }
 
@@ -230,22 +232,7 @@ impl<'a> Acting<'a> {
     fn publish(&mut self) {
         self.ports.publish_permit(|permit| self.supervisor.fill_permit(permit));
         self.ports.publish_state(|state| self.supervisor.fill_state(state));
-        self.tell_systemd();
-    }
-
-    /// READY once, the mode as status, and the watchdog's sign of life each cycle.
-    fn tell_systemd(&mut self) {
-        if std::env::var_os("NOTIFY_SOCKET").is_none() {
-            return;
-        }
-        let mode = self.supervisor.mode();
-        let _ = sd_notify::notify(&[sd_notify::NotifyState::Watchdog]);
-        if self.notified != Some(mode) {
-            let _ = sd_notify::notify(&[sd_notify::NotifyState::Status(mode.name())]);
-            if mode == Mode::Ready {
-                let _ = sd_notify::notify(&[sd_notify::NotifyState::Ready]);
-            }
-            self.notified = Some(mode);
-        }
+        let supervisor = &self.supervisor;
+        self.systemd.tell(now(), supervisor.mode(), |state| supervisor.fill_state(state));
     }
 }
