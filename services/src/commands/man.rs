@@ -75,11 +75,12 @@ fn collect(command: &Command, name: &str, pages: &mut Vec<Page>) -> Result<(), F
     man.render(&mut roff).map_err(Failure::internal)?;
     let text = String::from_utf8(roff).map_err(Failure::internal)?;
     pages.push(Page { name: format!("{name}.1"), text });
-    let verbs =
-        command.get_subcommands().filter(|verb| verb.get_name() != "help" && !verb.is_hide_set());
-    verbs
-        .into_iter()
-        .try_for_each(|verb| collect(verb, &format!("{name}-{}", verb.get_name()), pages))
+    for verb in command.get_subcommands() {
+        if verb.get_name() != "help" && !verb.is_hide_set() {
+            collect(verb, &format!("{name}-{}", verb.get_name()), pages)?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

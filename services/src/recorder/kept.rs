@@ -1,5 +1,6 @@
 //! Which recordings are kept: the newest that the configuration has room for, and none that are too old.
 
+use core::cmp::Reverse;
 use core::time::Duration;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -43,7 +44,7 @@ fn doomed(
     settings: &RecorderSettings,
     now: SystemTime,
 ) -> Vec<Recording> {
-    recordings.sort_by(|a, b| (b.written, &b.path).cmp(&(a.written, &a.path)));
+    recordings.sort_by_key(|recording| Reverse((recording.written, recording.path.clone())));
     let room = settings.keep_bytes.map(|keep| keep.saturating_sub(settings.file_bytes));
     let age = settings.keep_days.map(|days| Duration::from_secs(u64::from(days) * DAY));
     let mut kept = 0_u64;
