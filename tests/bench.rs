@@ -104,3 +104,11 @@ fn the_control_path_is_measured_with_top_beside_it() {
     let rows = object["rows"].as_array().unwrap();
     assert!(rows.len() == 2 && rows.iter().all(|row| row["rival"] == "without top"), "{object}");
 }
+
+#[test]
+fn the_control_path_is_measured_beside_those_who_mean_harm() {
+    let (object, output) = bench(&["hostile", "--seconds", "3"]);
+    check(&object, &output);
+    let rows = object["rows"].as_array().unwrap();
+    assert!(rows.len() == 4 && rows.iter().all(|row| row["rival"] == "alone"), "{object}");
+}

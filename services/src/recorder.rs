@@ -121,7 +121,7 @@ impl Drop for Recorder {
 fn take_in(feeds: &mut [Feed], writer: &mut Writer) -> Result<u64, WriteError> {
     let mut lost = 0;
     for feed in feeds {
-        lost += feed(writer)?;
+        lost = u64::saturating_add(lost, feed(writer)?);
     }
     writer.close_chunk_if_older(now())?;
     Ok(lost)
@@ -180,7 +180,8 @@ impl Gaps {
         if let Some((epoch, sequence)) = self.newest
             && epoch == header.epoch
         {
-            self.lost += header.sequence.saturating_sub(sequence + 1);
+            let missing = header.sequence.saturating_sub(sequence).saturating_sub(1);
+            self.lost = self.lost.saturating_add(missing);
         }
         self.newest = Some((header.epoch, header.sequence));
     }
@@ -197,5 +198,10 @@ mod tests {
             gaps.take(&Header { epoch, sequence, ..Header::default() });
         }
         assert_eq!(gaps.lost, 2 + 1);
+        // Nor does a sequence of a hostile publisher end the recorder.
+        for (epoch, sequence) in [(3, 1), (3, u64::MAX), (3, 1), (4, 1), (4, u64::MAX)] {
+            gaps.take(&Header { epoch, sequence, ..Header::default() });
+        }
+        assert_eq!(gaps.lost, u64::MAX);
     }
 }

@@ -164,6 +164,7 @@ impl Service {
         let takes_part = |process: &Process| match process {
             Process::Interface | Process::Ingest | Process::Estimator => true,
             Process::Recorder => self.stack.recorder.enabled,
+            Process::Gateway => self.stack.gateway.enabled && !replay,
             _ => !replay,
         };
         Process::SUPERVISED.into_iter().filter(takes_part).collect()

@@ -29,7 +29,7 @@ impl Sandbox {
         take_place();
         // Sockets live below it, and their paths have to be short.
         let folder = tempfile::Builder::new().prefix("kb").tempdir_in("/tmp").unwrap();
-        for part in ["run", "state", "work"] {
+        for part in ["run", "state", "work", "doors"] {
             fs::create_dir(folder.path().join(part)).unwrap();
         }
         Self { folder: Arc::new(folder), name: "one" }
@@ -52,6 +52,7 @@ impl Sandbox {
             .env(MARK, self.mark())
             .env("XDG_RUNTIME_DIR", self.run_time())
             .env("XDG_STATE_HOME", self.folder.path().join("state"))
+            .env("KERBSIDE_GATEWAYS", self.gateways())
             .env_remove("RUST_LOG")
             .env_remove("NOTIFY_SOCKET")
             .current_dir(self.folder.path().join("work"));
@@ -66,6 +67,11 @@ impl Sandbox {
     /// The instance of this sandbox.
     pub(crate) fn instance(&self) -> Instance {
         Instance::below(&self.run_time().join("kerbside"), self.name).unwrap()
+    }
+
+    /// The folder of this sandbox's gateways, where its verbs look for those of others.
+    pub(crate) fn gateways(&self) -> PathBuf {
+        self.folder.path().join("doors")
     }
 
     fn run_time(&self) -> PathBuf {

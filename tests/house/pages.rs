@@ -12,13 +12,14 @@ use kerbside_messages::topics::{Delivery, Publisher, TABLE, Topic};
 use crate::{assert_none, root};
 
 /// Pages for people.
-const PAGES: [&str; 9] = [
+const PAGES: [&str; 10] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "deploy/README.md",
     "docs/bindings.md",
     "deploy/fleet/README.md",
+    "docs/gateway.md",
     "docs/run-folders.md",
     "deploy/examples/microcontroller/README.md",
     "deploy/examples/python/README.md",
@@ -176,4 +177,19 @@ fn verbs_of_the_command_line_are_told_of() {
         .map(|verb| format!("README.md says nothing of kerbside {verb}"))
         .collect();
     assert_none(&untold);
+}
+
+#[test]
+fn requests_in_the_gateways_page_are_understood() {
+    let page = read("docs/gateway.md");
+    let now = page.split("\"now\":").nth(1).and_then(|rest| rest.split('}').next());
+    let now = now.and_then(|now| now.parse().ok()).expect("the greeting's clock");
+    let settings = kerbside_settings::GatewaySettings::default();
+    let requests: Vec<_> = page.lines().filter(|line| line.contains("\"request\":")).collect();
+    assert_eq!(requests.len(), 10, "this test looks at nothing");
+    let complain = |line: &&str| {
+        let (_, request) = kerbside::gateway::request::parse(line.as_bytes(), now, &settings);
+        request.err().map(|complaint| format!("docs/gateway.md: {line}: {complaint}"))
+    };
+    assert_none(&requests.iter().filter_map(complain).collect::<Vec<_>>());
 }

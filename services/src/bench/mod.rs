@@ -4,6 +4,7 @@ mod chain;
 mod drive;
 mod filter;
 mod hop;
+mod hostile;
 mod peer;
 mod pipeline;
 mod replay;
@@ -30,6 +31,9 @@ pub enum BenchVerb {
     /// The control path of a stack that drives, with `top` beside it and without.
     #[command(after_help = "Example: kerbside bench tools garage --seconds 14")]
     Tools(tools::ToolsArgs),
+    /// The control path of a stack that drives, alone, beside a rogue, and beside hostile clients of its gateway.
+    #[command(after_help = "Example: kerbside bench hostile garage --seconds 18")]
+    Hostile(hostile::HostileArgs),
     /// A whole stack from nothing to READY.
     #[command(after_help = "Example: kerbside bench start --repeats 10")]
     Start(start::StartArgs),
@@ -42,6 +46,9 @@ pub enum BenchVerb {
     /// The other process of `transport`.
     #[command(hide = true)]
     Peer(peer::PeerArgs),
+    /// The rogue of `hostile`.
+    #[command(hide = true)]
+    Rogue(hostile::RogueArgs),
     /// A process of the bare chain of `pipeline`.
     #[command(hide = true)]
     Link(chain::LinkArgs),
@@ -56,6 +63,8 @@ pub fn run(verb: &BenchVerb) -> Result<Exit, Failure> {
         BenchVerb::Transport(args) => transport::run(args),
         BenchVerb::Pipeline(args) => pipeline::run(args),
         BenchVerb::Tools(args) => tools::run(args),
+        BenchVerb::Hostile(args) => hostile::run(args),
+        BenchVerb::Rogue(args) => hostile::run_rogue(args),
         BenchVerb::Start(args) => start::run(args),
         BenchVerb::Replay(args) => replay::run(args),
         BenchVerb::Filter(args) => filter::run(args),

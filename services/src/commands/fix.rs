@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::operator::{Desk, OperatorArgs};
 use crate::exit::{Exit, Failure};
+use crate::gateway::remote::Remote;
 
 /// A fix can be read for so long at least: some rounds of the slowest reader.
 const LINGER: Duration = Duration::from_millis(100);
@@ -48,6 +49,9 @@ fn deviation(text: &str) -> Result<f64, String> {
 /// [`Failure`] where there is no stack, or no estimate comes.
 pub fn run(args: &FixArgs) -> Result<Exit, Failure> {
     let content = content(args)?;
+    if let Some(mut remote) = Remote::find(args.operator.instance.as_deref())? {
+        return remote_fix(args, &mut remote, &content);
+    }
     let desk = Desk::open(&args.operator)?;
     let mut odometry = Newest::of(desk.session.subscriber::<Odometry>(None, 1)?);
     let mut publisher = desk.session.publisher::<Fix>(None)?;
@@ -72,7 +76,19 @@ pub fn run(args: &FixArgs) -> Result<Exit, Failure> {
     let verdict = FixVerdict::from_code(after.fix_verdict).unwrap_or(FixVerdict::None);
     let accepted = verdict == FixVerdict::Accepted;
     let more = json!({ "verdict": verdict.name() });
-    args.operator.tell("fix", &desk, accepted, more, &format!("fix {verdict}"));
+    args.operator.tell("fix", desk.instance.name(), accepted, more, &format!("fix {verdict}"));
+    Ok(if accepted { Exit::Good } else { Exit::Bad })
+}
+
+/// The same through the gateway of another user's instance.
+fn remote_fix(args: &FixArgs, remote: &mut Remote, fix: &Fix) -> Result<Exit, Failure> {
+    let request = json!({ "request": "fix", "fix": {
+        "x": fix.x, "y": fix.y, "yaw": fix.yaw, "covariance": fix.covariance,
+    }});
+    let reply = remote.ask(&request, Duration::from_secs(2))?;
+    let Some(verdict) = reply["verdict"].as_str() else { return Err(remote.refused(&reply)) };
+    let (accepted, more) = (reply["ok"] == true, json!({ "verdict": verdict }));
+    args.operator.tell("fix", remote.instance(), accepted, more, &format!("fix {verdict}"));
     Ok(if accepted { Exit::Good } else { Exit::Bad })
 }
 

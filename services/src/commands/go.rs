@@ -1,5 +1,7 @@
 //! `go`: arms, has a plan made to a goal, and watches until the vehicle is there or stops.
 
+mod remote;
+
 use core::time::Duration;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,6 +17,7 @@ use serde_json::json;
 use super::operator::{self, Desk, OperatorArgs};
 use crate::configuration;
 use crate::exit::{Exit, Failure};
+use crate::gateway::remote::Remote;
 use crate::life::stop_flag;
 use crate::lockstep::words_of;
 use crate::manoeuvre::cause_of;
@@ -164,6 +167,9 @@ impl Arrival {
 pub fn run(args: &GoArgs) -> Result<Exit, Failure> {
     let wish = Wish::of(args)?;
     let stop = stop_flag()?;
+    if let Some(mut remote) = Remote::find(args.operator.instance.as_deref())? {
+        return remote::run(args, &wish, &mut remote, &stop);
+    }
     let mut desk = Desk::open(&args.operator)?;
     let mut odometry = Newest::of(desk.session.subscriber::<Odometry>(None, 1)?);
     let planner = desk.session.client::<PlanRequest, PlanAnswer>()?;
@@ -182,7 +188,7 @@ pub fn run(args: &GoArgs) -> Result<Exit, Failure> {
         "min_clearance_m": arrival.plan.map(|plan| plan.clearance).filter(|value| value.is_finite()),
         "gear_changes": arrival.plan.map(|plan| plan.gear_changes),
     });
-    args.operator.tell("go", &desk, arrival.there, more, &arrival.cause);
+    args.operator.tell("go", desk.instance.name(), arrival.there, more, &arrival.cause);
     Ok(if arrival.there { Exit::Good } else { Exit::Bad })
 }
 

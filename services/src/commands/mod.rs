@@ -10,6 +10,8 @@ mod recording;
 mod status;
 mod up;
 
+pub(crate) use status::object as status_object;
+
 use clap::{Parser, Subcommand};
 use kerbside_messages::Process;
 use kerbside_runtime::Instance;
@@ -31,7 +33,8 @@ use crate::tools;
 use crate::trial::TrialArgs;
 use crate::vehicle::VehicleArgs;
 use crate::{
-    actuation, estimator, ingest, interface, logging, park, planner, recorder, tracker, vehicle,
+    actuation, estimator, gateway, ingest, interface, logging, park, planner, recorder, tracker,
+    vehicle,
 };
 
 /// Name of the instance of `up`, and of services started by hand.
@@ -166,6 +169,9 @@ enum ServiceVerb {
     /// Samples to disk.
     #[command(after_help = "Example: kerbside service recorder --instance bay2")]
     Recorder(ServiceArgs),
+    /// The door for processes of other users.
+    #[command(after_help = "Example: kerbside service gateway --instance bay2")]
+    Gateway(ServiceArgs),
     /// The simulated vehicle, outside the supervised set.
     #[command(after_help = "Example: kerbside service vehicle --instance bay2 --start=-1,0.65,0")]
     Vehicle(VehicleArgs),
@@ -299,6 +305,7 @@ fn serve(verb: &ServiceVerb, level: Option<&str>) -> Result<Exit, Failure> {
         ServiceVerb::Tracker(args) => (Process::Tracker, args, tracker::run),
         ServiceVerb::Actuation(args) => (Process::Actuation, args, actuation::run),
         ServiceVerb::Recorder(args) => (Process::Recorder, args, recorder::run),
+        ServiceVerb::Gateway(args) => (Process::Gateway, args, gateway::run),
         ServiceVerb::Vehicle(args) => {
             let service = Service::load(Process::Vehicle, &args.service, DEFAULT_INSTANCE)?;
             start_log(&service, level);

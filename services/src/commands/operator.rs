@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use super::status::instance_of;
 use crate::exit::{Exit, Failure};
+use crate::gateway::remote::Remote;
 
 /// Longest wait for the supervisor's answer.
 const ANSWER: Duration = Duration::from_secs(1);
@@ -23,9 +24,9 @@ const LOOK: Duration = Duration::from_millis(5);
 /// Which stack, and how to answer.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct OperatorArgs {
-    /// Name of the instance; the only live one where not given.
+    /// Name of the instance, or the socket of its gateway; the only live one where not given.
     #[arg(long, value_name = "NAME")]
-    instance: Option<String>,
+    pub instance: Option<String>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -33,8 +34,7 @@ pub struct OperatorArgs {
 
 impl OperatorArgs {
     /// Prints the object of the verb `schema` under --json, else the sentence.
-    pub fn tell(&self, schema: &str, desk: &Desk, passed: bool, more: Value, sentence: &str) {
-        let name = desk.instance.name();
+    pub fn tell(&self, schema: &str, name: &str, passed: bool, more: Value, sentence: &str) {
         if !self.json {
             return println!("{name}: {sentence}");
         }
@@ -146,6 +146,9 @@ impl Desk {
 /// # Errors
 /// [`Failure`] where there is no stack or it does not answer.
 pub fn ask(args: &OperatorArgs, verb: Verb) -> Result<Exit, Failure> {
+    if let Some(mut remote) = Remote::find(args.instance.as_deref())? {
+        return remote_ask(args, &mut remote, verb);
+    }
     let mut desk = Desk::open(args)?;
     let (answer, mode) = if verb == Verb::Stop {
         let (answer, state) = desk.stop()?;
@@ -164,8 +167,40 @@ pub fn ask(args: &OperatorArgs, verb: Verb) -> Result<Exit, Failure> {
 /// Tells what the supervisor answered.
 pub fn tell(args: &OperatorArgs, desk: &Desk, answer: &OperatorAnswer, mode: Mode) -> Exit {
     let (accepted, words) = (answer.accepted == 1, text::as_str(&answer.text));
-    let more = json!({ "mode": mode.name(), "arms": answer.arms, "text": words });
-    let sentence = if accepted { mode.name().to_owned() } else { format!("refused: {words}") };
-    args.tell("operator", desk, accepted, more, &sentence);
+    tell_words(args, desk.instance.name(), accepted, mode.name(), answer.arms, words)
+}
+
+fn tell_words(
+    args: &OperatorArgs,
+    instance: &str,
+    accepted: bool,
+    mode: &str,
+    arms: u64,
+    words: &str,
+) -> Exit {
+    let more = json!({ "mode": mode, "arms": arms, "text": words });
+    let sentence = if accepted { mode.to_owned() } else { format!("refused: {words}") };
+    args.tell("operator", instance, accepted, more, &sentence);
     if accepted { Exit::Good } else { Exit::Bad }
+}
+
+/// The same through the gateway of another user's instance.
+fn remote_ask(args: &OperatorArgs, remote: &mut Remote, verb: Verb) -> Result<Exit, Failure> {
+    if verb == Verb::Down {
+        return Err(Failure::with_help(
+            Exit::Unavailable,
+            format!("instance {} is another user's", remote.instance()),
+            "only its own user may end it; kerbside stop stops the vehicle",
+        ));
+    }
+    let reply = remote.ask(&json!({ "request": verb.name() }), 2 * ANSWER)?;
+    let words = reply["error"]["found"].as_str().unwrap_or_default();
+    let Some(mode) = reply["mode"].as_str() else { return Err(remote.refused(&reply)) };
+    let accepted = reply["ok"] == true;
+    let mut mode = mode.to_owned();
+    if verb == Verb::Stop && accepted {
+        mode = remote.until_stopped(END)?.name().to_owned();
+    }
+    let arms = reply["arms"].as_u64().unwrap_or_default();
+    Ok(tell_words(args, remote.instance(), accepted, &mode, arms, words))
 }

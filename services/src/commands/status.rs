@@ -5,9 +5,10 @@ use core::time::Duration;
 use comfy_table::Table;
 use kerbside_messages::{Mode, Process, ProcessRow, ProcessState, State, text};
 use kerbside_runtime::{Instance, Newest, Session, Ticker, now};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::exit::{Exit, Failure};
+use crate::gateway::remote::Remote;
 use crate::manoeuvre::cause_of;
 
 /// Longest wait for a state: the supervisor publishes it every few milliseconds.
@@ -16,7 +17,7 @@ const PATIENCE: u64 = 1_000_000_000;
 /// What `status` is asked.
 #[derive(Clone, Debug, clap::Args)]
 pub struct StatusArgs {
-    /// Name of the instance; the only live one where not given.
+    /// Name of the instance, or the socket of its gateway; the only live one where not given.
     #[arg(long, value_name = "NAME")]
     instance: Option<String>,
     /// Print one JSON object.
@@ -70,6 +71,10 @@ pub fn instance_of(name: Option<&str>) -> Result<Instance, Failure> {
 /// # Errors
 /// [`Failure`] where there is no instance.
 pub fn run(args: &StatusArgs) -> Result<Exit, Failure> {
+    if let Some(mut remote) = Remote::find(args.instance.as_deref())? {
+        let state = remote.state()?;
+        return Ok(tell(args, remote.instance(), &state));
+    }
     let instance = instance_of(args.instance.as_deref())?;
     let session = Session::join(&instance, Process::Operator)?;
     let mut state = Newest::of(session.subscriber::<State>(None, 1)?);
@@ -83,37 +88,41 @@ pub fn run(args: &StatusArgs) -> Result<Exit, Failure> {
         look.wait();
     }
     let Some(state) = state.get() else { return Err(Failure::internal("a state without content")) };
-    if args.json {
-        print_json(&instance, state)
-    } else {
-        print_table(&instance, state)
-    }
-    Ok(if state.mode() == Mode::Faulted { Exit::Bad } else { Exit::Good })
+    Ok(tell(args, instance.name(), state))
 }
 
-fn print_json(instance: &Instance, state: &State) {
+fn tell(args: &StatusArgs, instance: &str, state: &State) -> Exit {
+    if args.json {
+        println!("{}", object(instance, state));
+    } else {
+        print_table(instance, state);
+    }
+    if state.mode() == Mode::Faulted { Exit::Bad } else { Exit::Good }
+}
+
+/// A state as `status --json` prints it.
+pub(crate) fn object(instance: &str, state: &State) -> Value {
     let row = |row: &ProcessRow| {
         json!({
             "name": name_of(row), "pid": row.pid, "state": state_of(row), "restarts": row.restarts,
             "misses": row.misses, "age_ms": row.age_ms, "waiting_for": text::as_str(&row.waiting_for),
         })
     };
-    let object = json!({
+    json!({
         "schema": "kerbside.status.v1",
         "version": env!("CARGO_PKG_VERSION"),
         "seed": null,
         "passed": state.mode() != Mode::Faulted,
         "figures": [],
-        "instance": instance.name(),
+        "instance": instance,
         "mode": state.mode().name(),
         "cause": cause_of(state),
         "processes": state.rows().iter().map(row).collect::<Vec<_>>(),
-    });
-    println!("{object}");
+    })
 }
 
-fn print_table(instance: &Instance, state: &State) {
-    println!("instance {}, supervised by process {}", instance.name(), state.pid);
+fn print_table(instance: &str, state: &State) {
+    println!("instance {instance}, supervised by process {}", state.pid);
     match cause_of(state).as_str() {
         "" => println!("mode {}", state.mode()),
         cause => println!("mode {}: {cause}", state.mode()),

@@ -11,13 +11,14 @@ mod systemd;
 use core::time::Duration;
 use std::collections::BTreeMap;
 
-use kerbside_messages::{Mode, OperatorAnswer, OperatorRequest, Process, Verb};
+use kerbside_messages::{MAX_ROWS, Mode, OperatorAnswer, OperatorRequest, Process, Verb};
 use kerbside_runtime::{Asked, FileLock, Services, Ticker, kill, now};
 use kerbside_safety::{Action, Actions, Event, Supervised, Supervisor, bounds};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::MissedTickBehavior;
 
 use crate::exit::{Exit, Failure};
+use crate::gateway::Rights;
 use crate::life::{self, Service};
 use children::Children;
 use ports::Ports;
@@ -26,6 +27,9 @@ use systemd::Systemd;
 
 /// Longest wait for what an earlier life left to end.
 const LEFTOVERS: Duration = Duration::from_secs(2);
+// A process without a row in the state would be watched by nobody.
+const _: () = assert!(Process::SUPERVISED.len() <= MAX_ROWS);
+
 /// Time between looks whether it did.
 const LOOK: Duration = Duration::from_millis(1);
 
@@ -34,6 +38,10 @@ const LOOK: Duration = Duration::from_millis(1);
 /// # Errors
 /// [`Failure`] where the instance is busy or cannot be set up.
 pub fn run(service: &Service, ready: impl FnOnce()) -> Result<Exit, Failure> {
+    if service.supervised().contains(&Process::Gateway) {
+        // Said by whoever a person started, not by a process that dies of it again and again.
+        Rights::of(&service.stack.gateway, rustix::process::geteuid().as_raw())?;
+    }
     let lock = service.instance.lock()?;
     end_leftovers(service)?;
     let services = Services::create(&service.instance)?;

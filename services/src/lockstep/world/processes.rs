@@ -154,7 +154,7 @@ impl World {
 fn checkpoints_of(process: Process) -> u32 {
     match process {
         Process::Interface => 2,
-        Process::Planner | Process::Recorder => 0,
+        Process::Planner | Process::Recorder | Process::Gateway => 0,
         _ => 1,
     }
 }

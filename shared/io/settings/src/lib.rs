@@ -40,8 +40,8 @@ pub use run::RunInfo;
 pub use scenario::{Disturbance, Gear, Obstacle, PlanLimits, Scenario, Tolerance};
 pub use sources::{COMPILED_IN, FileKind, Sources};
 pub use stack::{
-    Compression, InterfaceKind, InterfaceSettings, LogFormat, LogLevel, LogSettings,
-    REAL_TIME_TIMEOUTS, RealtimeMode, RealtimeSettings, RecorderSettings, Stack, Start,
-    scaled_tracker,
+    Compression, GatewaySettings, InterfaceKind, InterfaceSettings, LogFormat, LogLevel,
+    LogSettings, REAL_TIME_TIMEOUTS, RealtimeMode, RealtimeSettings, RecorderSettings, Right,
+    Stack, Start, scaled_tracker,
 };
 pub use vehicle::{CALIBRATED, Calibration, Uncertainty, VehicleFile};

@@ -181,7 +181,8 @@ impl<M: Message> Admission<M> {
         let expected = if new_epoch { sequence } else { self.sequence + 1 };
         let missing = sequence - expected;
         if matches!(M::TOPIC.delivery, Delivery::InOrder { .. }) {
-            self.counts.lost += missing;
+            // A hostile peer may leave out as many as it likes, again and again.
+            self.counts.lost = self.counts.lost.saturating_add(missing);
         }
         (self.epoch, self.sequence) = (epoch, sequence);
         Ok(Admitted { missing, new_epoch })
@@ -227,6 +228,17 @@ mod tests {
         assert_eq!(admission.admit(&sample(1, 9), &[], 10), Err(Refusal::Epoch));
         assert_eq!(admission.counts().lost, 2);
         assert_eq!(admission.counts().total(), 2);
+    }
+
+    #[test]
+    fn no_leap_of_the_sequence_is_too_far_to_count() {
+        let mut admission = Admission::<Raw>::default();
+        for epoch in 1..4 {
+            assert!(admission.admit(&sample(epoch, 1), &[], 10).is_ok());
+            assert!(admission.admit(&sample(epoch, u64::MAX), &[], 10).is_ok());
+            assert_eq!(admission.admit(&sample(epoch, 5), &[], 10), Err(Refusal::Order));
+        }
+        assert_eq!(admission.counts().lost, u64::MAX);
     }
 
     #[test]

@@ -93,6 +93,34 @@ pub struct Field {
     pub doc: &'static str,
 }
 
+impl Field {
+    /// Whether it holds text: UTF-8, filled up with zeros, as its documentation says.
+    #[must_use]
+    pub fn is_text(&self) -> bool {
+        self.kind == Kind::U8 && self.count.is_some() && self.doc.contains("UTF-8")
+    }
+
+    /// Whether nothing is in it: it fills a gap that the compiler would leave.
+    #[must_use]
+    pub fn is_reserved(&self) -> bool {
+        self.name == "reserved"
+    }
+}
+
+impl Kind {
+    /// Bytes of one element.
+    #[must_use]
+    pub const fn size(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 => 2,
+            Self::U32 => 4,
+            Self::U64 | Self::I64 | Self::F64 => 8,
+            Self::Nested(layout) => layout.size,
+        }
+    }
+}
+
 /// A message or a part of one.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Layout {

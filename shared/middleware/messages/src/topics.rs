@@ -34,11 +34,13 @@ pub enum Process {
     Vehicle = 8,
     /// A person's command line.
     Operator = 9,
+    /// The door for processes of other users.
+    Gateway = 10,
 }
 
 impl Process {
     /// The processes a supervisor supervises, in the order of the sample's way.
-    pub const SUPERVISED: [Self; 7] = [
+    pub const SUPERVISED: [Self; 8] = [
         Self::Interface,
         Self::Ingest,
         Self::Estimator,
@@ -46,10 +48,11 @@ impl Process {
         Self::Tracker,
         Self::Actuation,
         Self::Recorder,
+        Self::Gateway,
     ];
 
     /// Every process.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Interface,
         Self::Ingest,
         Self::Estimator,
@@ -60,6 +63,7 @@ impl Process {
         Self::Supervisor,
         Self::Vehicle,
         Self::Operator,
+        Self::Gateway,
     ];
 
     /// The name used on the command line, in files and in logs.
@@ -76,6 +80,7 @@ impl Process {
             Self::Supervisor => "supervisor",
             Self::Vehicle => "vehicle",
             Self::Operator => "operator",
+            Self::Gateway => "gateway",
         }
     }
 

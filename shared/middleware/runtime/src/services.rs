@@ -19,8 +19,8 @@ use crate::{Instance, InstanceError};
 pub(crate) const NODES: usize = 40;
 /// Subscribers of a topic that the table does not name: tools, and processes that others wrote.
 pub const GUESTS: usize = 6;
-/// Subscribers beyond those of the table: guests, and those whose dead predecessor is not swept yet.
-const SPARE_SUBSCRIBERS: usize = GUESTS + 2;
+/// Subscribers beyond those of the table: guests, the gateway, and those whose dead predecessor is not swept yet.
+const SPARE_SUBSCRIBERS: usize = GUESTS + 3;
 /// Publishers of a topic that anybody may publish.
 const ANY_PUBLISHERS: usize = 16;
 /// A process and its dead predecessor.

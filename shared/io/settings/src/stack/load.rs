@@ -75,6 +75,8 @@ fn stack(
     });
     let mut recorder = draft.recorder;
     recorder.folder = local(draft.recorder_folder);
+    let mut gateway = draft.gateway;
+    gateway.socket = local(draft.gateway_socket);
     let interface = match draft.interface {
         InterfaceKind::Line => {
             InterfaceSettings::Line { device: local(draft.device), baud: draft.baud }
@@ -95,6 +97,7 @@ fn stack(
         interface,
         realtime: draft.realtime,
         recorder,
+        gateway,
         log: draft.log,
         start: draft.start,
     }

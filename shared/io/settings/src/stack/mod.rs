@@ -2,6 +2,7 @@
 
 mod bounds;
 mod defaults;
+mod gateway;
 mod keys;
 mod load;
 mod prior;
@@ -19,6 +20,7 @@ use crate::declare::choices;
 use crate::{Calibration, Uncertainty};
 
 pub use defaults::{REAL_TIME_TIMEOUTS, scaled_tracker};
+pub use gateway::{GatewaySettings, Right};
 pub(crate) use keys::{StackDraft, schema};
 pub(crate) use load::load;
 
@@ -51,6 +53,8 @@ pub struct Stack {
     pub realtime: RealtimeSettings,
     /// Recording.
     pub recorder: RecorderSettings,
+    /// The door for other users.
+    pub gateway: GatewaySettings,
     /// Logging.
     pub log: LogSettings,
     /// Who starts each process, in the order of [`Process::SUPERVISED`]: see [`Stack::start_of`].

@@ -26,7 +26,7 @@ impl Rules {
     /// At least a quarter of the beats that belong into a window, at most twice as many: what lies
     /// between is the scheduler of a busy machine.
     pub(crate) fn new(process: Process, timeouts: &Timeouts) -> Self {
-        let slow = matches!(process, Process::Planner | Process::Recorder);
+        let slow = matches!(process, Process::Planner | Process::Recorder | Process::Gateway);
         let window = ns(if slow { timeouts.slow_window } else { timeouts.heartbeat_window });
         let expected = window / ns(timeouts.heartbeat).max(1);
         let expected = u32::try_from(expected).unwrap_or(u32::MAX / 4);

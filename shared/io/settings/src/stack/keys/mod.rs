@@ -1,5 +1,6 @@
 //! The keys of `stack.toml`.
 
+mod gateway;
 mod motion;
 mod supervision;
 mod surroundings;
@@ -13,7 +14,9 @@ use kerbside_safety::SafetySettings;
 use kerbside_tracking::TrackerSettings;
 
 use super::defaults::{scaled_tracker, timeouts};
-use super::{InterfaceKind, LogSettings, RealtimeSettings, RecorderSettings, Start};
+use super::{
+    GatewaySettings, InterfaceKind, LogSettings, RealtimeSettings, RecorderSettings, Start,
+};
 use crate::declare::{Kind, Schema};
 
 /// A stack as far as its file states it, on top of the defaults.
@@ -30,6 +33,8 @@ pub(crate) struct StackDraft {
     pub(in crate::stack) realtime: RealtimeSettings,
     pub(in crate::stack) recorder: RecorderSettings,
     pub(in crate::stack) recorder_folder: Option<String>,
+    pub(in crate::stack) gateway: GatewaySettings,
+    pub(in crate::stack) gateway_socket: Option<String>,
     pub(in crate::stack) log: LogSettings,
     pub(in crate::stack) start: [Start; Process::SUPERVISED.len()],
     pub(in crate::stack) initial: InitialDraft,
@@ -62,6 +67,8 @@ impl StackDraft {
             realtime: RealtimeSettings::default(),
             recorder: RecorderSettings::default(),
             recorder_folder: None,
+            gateway: GatewaySettings::default(),
+            gateway_socket: None,
             log: LogSettings::default(),
             start: [Start::Supervisor; Process::SUPERVISED.len()],
             initial: InitialDraft {
@@ -98,5 +105,5 @@ fn declare() -> Schema<StackDraft> {
         |s| &mut s.vehicle,
     );
     let schema = motion::declare(supervision::declare(schema));
-    surroundings::declare(schema)
+    gateway::declare(surroundings::declare(schema))
 }

@@ -2,7 +2,7 @@
 
 use kerbside_messages::{Cause, EstimatorState, Mode, ProcessState, ResetReason, Verb, text};
 
-use super::world::{MS, World};
+use super::world::{MS, World, place};
 use super::*;
 
 fn control_path() -> impl Iterator<Item = Process> {
@@ -10,7 +10,7 @@ fn control_path() -> impl Iterator<Item = Process> {
 }
 
 fn row(world: &World, process: Process) -> kerbside_messages::ProcessRow {
-    world.state().processes[process as usize]
+    world.state().processes[place(process)]
 }
 
 #[test]
@@ -38,7 +38,7 @@ fn a_death_on_the_control_path_stops_faults_and_restarts() {
 
 #[test]
 fn planner_and_recorder_die_without_stopping_the_vehicle() {
-    for process in [Process::Planner, Process::Recorder] {
+    for process in [Process::Planner, Process::Recorder, Process::Gateway] {
         for make in [World::ready, World::armed, World::driving] {
             let mut world = make();
             let before = world.mode();
@@ -79,7 +79,7 @@ fn a_stopped_process_is_a_fault_is_killed_and_comes_back() {
 
 #[test]
 fn a_stopped_planner_is_killed_while_the_plan_is_completed() {
-    for process in [Process::Planner, Process::Recorder] {
+    for process in [Process::Planner, Process::Recorder, Process::Gateway] {
         let mut world = World::driving();
         world.actor(process).stopped = true;
         world.run(1_900);

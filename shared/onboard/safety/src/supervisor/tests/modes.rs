@@ -19,7 +19,8 @@ fn starts_everything_at_once_and_is_ready_when_all_are() {
     world.run(500);
     assert_eq!(world.mode(), Mode::Starting);
     let state = world.state();
-    assert_eq!((state.rows, state.pid, state.healthy), (7, 42, 0));
+    let rows = u32::try_from(Process::SUPERVISED.len()).unwrap();
+    assert_eq!((state.rows, state.pid, state.healthy), (rows, 42, 0));
     assert_eq!(state.rows()[3].state, ProcessState::Starting.code());
     assert_eq!(text::as_str(&state.rows()[3].waiting_for), "odometry");
     world.actor(Process::Planner).unready = false;
@@ -292,7 +293,8 @@ fn what_does_not_end_is_killed_after_a_second() {
     world.run(20);
     assert_eq!(world.count(Action::Kill(Process::Ingest)), 1);
     assert_eq!(world.count(Action::Finished { exit: 1 }), 1);
-    assert_eq!(world.count(Action::CleanUp), 8, "after each death, and at the end");
+    let swept = world.count(Action::CleanUp);
+    assert_eq!(swept, Process::SUPERVISED.len() + 1, "after each death, and at the end");
 }
 
 #[test]

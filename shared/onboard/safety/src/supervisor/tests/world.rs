@@ -46,10 +46,15 @@ impl Actor {
     }
 }
 
+/// A process's place among the supervised, which is that of its row too.
+pub(super) fn place(process: Process) -> usize {
+    Process::SUPERVISED.iter().position(|supervised| *supervised == process).unwrap()
+}
+
 pub(super) struct World {
     pub(super) supervisor: Supervisor,
     pub(super) now: Nanos,
-    pub(super) actors: [Actor; 7],
+    pub(super) actors: [Actor; Process::SUPERVISED.len()],
     external: Option<Process>,
     /// As by SIGSTOP or SIGKILL of the supervisor.
     pub(super) unsupervised: bool,
@@ -164,11 +169,11 @@ impl World {
     }
 
     pub(super) fn actor(&mut self, process: Process) -> &mut Actor {
-        &mut self.actors[process as usize]
+        &mut self.actors[place(process)]
     }
 
     pub(super) fn runs(&self, process: Process) -> bool {
-        self.actors[process as usize].runs(self.now)
+        self.actors[place(process)].runs(self.now)
     }
 
     pub(super) fn start(&mut self, process: Process) {
@@ -178,7 +183,7 @@ impl World {
         actor.beat.header.epoch = u64::from(self.pids);
         actor.beat.process = process as u8;
         actor.beat.pid = self.pids;
-        self.actors[process as usize] = actor;
+        self.actors[place(process)] = actor;
         match process {
             Process::Actuation => self.gate = Gate::new(&LIMITS, &settings()),
             Process::Tracker => (self.plan, self.command) = (None, None),
@@ -204,7 +209,7 @@ impl World {
     }
 
     pub(super) fn end(&mut self, process: Process, exit: Exit) {
-        self.actors[process as usize] = Actor::default();
+        self.actors[place(process)] = Actor::default();
         if self.external != Some(process) {
             self.event(Event::Exited { process, exit });
         }
