@@ -7,6 +7,7 @@ pub mod actuation;
 pub mod bench;
 pub mod bindings;
 pub mod calibrate;
+pub mod case_folder;
 pub mod children;
 pub mod commands;
 pub mod compare;

@@ -1,9 +1,9 @@
 //! What either method finds, in one form.
 
 use kerbside_calibration::{
-    COUNT, Calibrated, CalibrationError, ClosedForm, Derived, Finding, PARAMETERS, Parameter,
-    Parameters, Rejected, Run, RunResiduals, Settings, Square, SteeringCheck, Vector, calibrate,
-    check_steering, closed_form, diagnose_runs, fold_of, information,
+    COUNT, Calibrated, CalibrationError, ClosedForm, Derived, Finding, GyroBias, PARAMETERS,
+    Parameter, Parameters, Rejected, Run, RunResiduals, Settings, Square, SteeringCheck, Vector,
+    calibrate, check_steering, closed_form, diagnose_runs, fold_of, information,
 };
 use kerbside_geometry::Vehicle;
 use kerbside_settings::CALIBRATED;
@@ -48,6 +48,8 @@ pub struct Found {
     pub covariance: Option<Square>,
     /// Variances of all parameters from drive to drive, beyond the readings' noise; 0 where there is nothing beyond.
     pub between: Vector,
+    /// What the gyro reads at rest; none where it does not tell of the turn.
+    pub gyro_bias: Option<GyroBias>,
     /// Runs that the parameters come from.
     pub runs: Vec<String>,
     /// Runs that were rejected.
@@ -116,6 +118,7 @@ fn joint(found: Calibrated, vehicle: &Vehicle) -> Found {
         estimates: found.estimates.iter().map(estimate).collect(),
         covariance: Some(found.covariance),
         between: found.between,
+        gyro_bias: found.gyro_bias,
         runs: found.residuals.iter().map(|run| run.run.clone()).collect(),
         missing: found.missing.iter().map(missing).collect(),
         rejected: found.rejected,
@@ -156,6 +159,7 @@ fn closed(runs: &[Run], vehicle: &Vehicle, settings: &Settings) -> Result<Found,
         estimates: closed_estimates(&form, vehicle, &kept),
         covariance: None,
         between: Vector::zeros(),
+        gyro_bias: None,
         runs: used,
         rejected,
         findings,

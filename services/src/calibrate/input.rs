@@ -5,10 +5,10 @@ use std::path::Path;
 use kerbside_calibration::{ReferencePose, Run, Series};
 use kerbside_geometry::{Vehicle, WHEELS, Wheel};
 use kerbside_recordings::run_folder;
-use kerbside_settings::{VehicleFile, parse_vehicle};
+use kerbside_settings::VehicleFile;
 
 use super::drift::Recorded;
-use crate::configuration::{self, refused_run as refused};
+use crate::case_folder::CaseFolder;
 use crate::exit::{Exit, Failure};
 
 /// A case, read.
@@ -34,31 +34,17 @@ impl Case {
     /// # Errors
     /// [`Failure`]: the vehicle is refused, there is no run, or a run is not as the format says.
     pub fn read(folder: &Path) -> Result<Self, Failure> {
-        let folders = run_folder::runs_of(folder).map_err(refused)?;
-        if folders.is_empty() {
-            return Err(Failure::with_help(
-                Exit::Data,
-                format!("{}: no case: there is no run in runs/", folder.display()),
-                "a case is a folder with vehicle.toml and a folder runs/NAME per run",
-            ));
-        }
-        let path = folder.join("vehicle.toml");
-        let origin = path.display().to_string();
-        let text = std::fs::read_to_string(&path)
-            .map_err(|error| Failure::new(Exit::Data, format!("{origin}: {error}")))?;
-        let parsed = parse_vehicle(&origin, &text)?;
-        configuration::warn(&parsed.warnings);
+        let read = CaseFolder::read(folder, Exit::Configuration)?;
         let mut case = Self {
-            origin,
-            text,
-            file: parsed.value,
+            origin: read.origin,
+            text: read.text,
+            file: read.vehicle,
             runs: Vec::new(),
             recorded: Recorded::new(),
             notices: Vec::new(),
         };
-        for folder in folders {
-            let recorded = run_folder::Run::read(&folder).map_err(refused)?;
-            case.recorded.insert(recorded.about.info.name.clone(), (folder.clone(), None));
+        for (folder, recorded) in read.runs {
+            case.recorded.insert(recorded.about.info.name.clone(), (folder, None));
             case.take(&recorded);
         }
         case.notices.sort();

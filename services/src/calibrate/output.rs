@@ -44,6 +44,7 @@ pub fn text_of(case: &Case, found: &Found, provenance: &Provenance<'_>) -> Resul
         put(root, &path_of(estimate.parameter), number(rounded(estimate)));
     }
     right_wheels(root, case.vehicle(), found);
+    gyro_bias(root, case.vehicle(), found);
     uncertainty(root, found);
     root.remove("calibration");
     root.insert("calibration", Item::Table(calibration(found, provenance)));
@@ -138,6 +139,17 @@ fn right_wheels(root: &mut Table, vehicle: &Vehicle, found: &Found) {
         if let (Some(of_left), true) = (of_left, track == 0.0 && stated) {
             put(root, &["radius", right], number(rounded(of_left)));
         }
+    }
+}
+
+/// What the gyro reads at rest, and how surely the next drive's is that: of one run alone nothing is said of the next.
+fn gyro_bias(root: &mut Table, vehicle: &Vehicle, found: &Found) {
+    let Some(bias) = found.gyro_bias.filter(|_| vehicle.gyro.is_some()) else { return };
+    let step = bias.deviation.unwrap_or(1e-3) * 1e-3;
+    put(root, &["gyro", "bias"], number(significant(bias.value, step)));
+    if let Some(deviation) = bias.deviation {
+        let stated = number(significant(deviation, deviation * 1e-2));
+        put(root, &["uncertainty", "effect", "gyro_bias", "bias"], stated);
     }
 }
 

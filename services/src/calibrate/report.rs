@@ -12,7 +12,7 @@ use kerbside_reports::{
 use super::Calibration;
 use super::fit::{Estimate, key};
 use super::judge::{Rms, SOURCES};
-use super::summary::{decimals_of, grouped, steering_in_words};
+use super::summary::{decimals_of, grouped, gyro_in_words, steering_in_words};
 
 /// Runs whose paths are drawn, at most.
 const DRAWN: usize = 8;
@@ -41,6 +41,8 @@ pub fn of(calibration: &Calibration) -> CalibrateReport {
     let findings = grouped(&found.findings);
     let steering = steering_in_words(calibration);
     let steering = steering.map(|words| format!("The steering sensor {words}."));
+    let gyro = gyro_in_words(calibration).map(|words| format!("The gyro {words}."));
+    let sensors: Vec<String> = steering.into_iter().chain(gyro).collect();
     CalibrateReport {
         vehicle: case.vehicle().name.clone(),
         method: method(calibration),
@@ -58,7 +60,7 @@ pub fn of(calibration: &Calibration) -> CalibrateReport {
         missing: missing.collect(),
         rejected: found.rejected.iter().map(|Rejected { run, why }| note(run, why)).collect(),
         findings: findings.iter().map(|(what, runs)| note(runs, what)).collect(),
-        notes: case.notices.iter().cloned().chain(steering).collect(),
+        notes: case.notices.iter().cloned().chain(sensors).collect(),
         provenance: provenance(calibration),
     }
 }

@@ -62,6 +62,7 @@ fn as_json(calibration: &Calibration) -> Value {
         "inflation": found.inflation,
         "allowance": allowance_as_json(calibration),
         "derived": derived,
+        "gyro_bias": found.gyro_bias.map(|bias| json!({ "value": bias.value, "deviation": bias.deviation })),
         "left_out": left_out_as_json(calibration),
         "drift": drift_as_json(calibration),
         "residuals": residuals.collect::<Vec<_>>(),
@@ -201,6 +202,7 @@ fn print(calibration: &Calibration) {
     for run in &found.rejected {
         println!("rejected   {}: {}", run.run, run.why);
     }
+    gyro_in_words(calibration).iter().for_each(|words| println!("gyro       {words}"));
     steering_in_words(calibration).iter().for_each(|words| println!("steering   {words}"));
     for (what, runs) in grouped(&found.findings) {
         println!("found      {runs}: {what}");
@@ -338,6 +340,16 @@ pub fn steering_in_words(calibration: &Calibration) -> Option<String> {
         check.windows,
         check.refused
     ))
+}
+
+/// What the gyro reads at rest, a sentence.
+pub fn gyro_in_words(calibration: &Calibration) -> Option<String> {
+    let bias = calibration.found.gyro_bias?;
+    let next = match bias.deviation {
+        Some(deviation) => format!("± {deviation:.5} rad/s from run to run"),
+        None => "of one run: how far the next one's is off is not known".to_owned(),
+    };
+    Some(format!("reads {:+.5} rad/s at rest, {next}", bias.value))
 }
 
 /// Findings that do not forbid, each once, with the runs it is of.

@@ -74,7 +74,7 @@ pub fn run(args: &FixArgs) -> Result<Exit, Failure> {
     let after = wait_for(&mut odometry, judged, "the estimator did not take up the fix")?;
     lingering.wait();
     let verdict = FixVerdict::from_code(after.fix_verdict).unwrap_or(FixVerdict::None);
-    let accepted = verdict == FixVerdict::Accepted;
+    let accepted = matches!(verdict, FixVerdict::Accepted | FixVerdict::Widened);
     let more = json!({ "verdict": verdict.name() });
     args.operator.tell("fix", desk.instance.name(), accepted, more, &format!("fix {verdict}"));
     Ok(if accepted { Exit::Good } else { Exit::Bad })

@@ -6,10 +6,10 @@ use std::path::Path;
 use kerbside_diagnosis::{Allowance, Case, Run, Series, Wheels};
 use kerbside_geometry::{Vehicle, WHEELS, Wheel, angle};
 use kerbside_recordings::run_folder::{self, CommandRow, ReferenceRow, Table};
-use kerbside_settings::{Uncertainty, load_vehicle};
+use kerbside_settings::Uncertainty;
 use kerbside_simulation::Command;
 
-use crate::configuration::{self, refused_run as refused};
+use crate::case_folder::CaseFolder;
 use crate::exit::{Exit, Failure};
 
 /// A case, read.
@@ -29,30 +29,17 @@ impl Input {
     /// # Errors
     /// [`Failure`]: the vehicle is refused, there is no run, or a run is not as the format says.
     pub fn read(folder: &Path) -> Result<Self, Failure> {
-        let folders = run_folder::runs_of(folder).map_err(refused)?;
-        if folders.is_empty() {
-            return Err(Failure::with_help(
-                Exit::Data,
-                format!("{}: no case: there is no run in runs/", folder.display()),
-                "a case is a folder with vehicle.toml and a folder runs/NAME per run",
-            ));
-        }
-        let path = folder.join("vehicle.toml");
-        let origin = path.display().to_string();
-        let parsed = load_vehicle(&path)
-            .map_err(|error| Failure { exit: Exit::Data, ..Failure::from(error) })?;
-        configuration::warn(&parsed.warnings);
-        let (vehicle, allowance) = (parsed.value.vehicle, allowance(&parsed.value.uncertainty));
+        let read = CaseFolder::read(folder, Exit::Data)?;
+        let (vehicle, allowance) = (read.vehicle.vehicle, allowance(&read.vehicle.uncertainty));
         let mut notices = Vec::new();
         let mut runs = Vec::new();
-        for folder in folders {
-            let recorded = run_folder::Run::read(&folder).map_err(refused)?;
+        for (folder, recorded) in read.runs {
             runs.push(run(&recorded, &vehicle, &mut notices).ok_or_else(|| no_wheel(&folder))?);
         }
         notices.sort();
         notices.dedup();
         let name = name_of(folder)?;
-        Ok(Self { origin, case: Case { name, vehicle, allowance, runs }, notices })
+        Ok(Self { origin: read.origin, case: Case { name, vehicle, allowance, runs }, notices })
     }
 }
 

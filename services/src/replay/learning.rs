@@ -45,6 +45,8 @@ pub struct Lesson {
     pub given: u64,
     /// Fixes that corrected the pose.
     pub taken: u64,
+    /// How often the filter widened its covariance as fixes contradicted it again and again.
+    pub widened: u64,
     /// The parameters when the fixes ended.
     pub learnt: Vec<Learnt>,
     /// Drift on the rest of an estimator without fixes, or why it cannot be known.
@@ -135,6 +137,7 @@ pub(super) fn learn(
         share: asked.share,
         given: fixes.len() as u64,
         taken: driven.taken,
+        widened: driven.widened,
         learnt: learnt(vehicle, sensors, &driven.first, &driven.then),
         without: judge(track),
         with: judge(&driven.track),
@@ -182,6 +185,7 @@ fn fixes(
 struct Driven {
     track: Track,
     taken: u64,
+    widened: u64,
     /// The first sample, and that with the last fix.
     first: Odometry,
     then: Odometry,
@@ -191,13 +195,16 @@ fn drive(job: &Job, fixes: &[Fix], until: Nanos) -> Result<Driven, Failure> {
     let mut chain = Chain::new(&job.service)?;
     let mut track = Track::with_capacity(job.input.raws.len());
     let mut waiting = fixes.iter().peekable();
-    let (mut first, mut then, mut taken, mut judged) = (None, Odometry::default(), 0, 0);
+    let (mut first, mut then, mut judged) = (None, Odometry::default(), 0);
+    let (mut taken, mut widened) = (0, 0);
     for raw in &job.input.raws {
         let fix = waiting.next_if(|fix| fix.header.stamp <= raw.arrival);
         let Some(odometry) = chain.step_with(raw, fix) else { continue };
         if odometry.fix_sequence != judged {
             judged = odometry.fix_sequence;
-            taken += u64::from(odometry.fix_verdict == FixVerdict::Accepted.code());
+            let widen = odometry.fix_verdict == FixVerdict::Widened.code();
+            widened += u64::from(widen);
+            taken += u64::from(widen || odometry.fix_verdict == FixVerdict::Accepted.code());
         }
         first.get_or_insert(*odometry);
         if odometry.header.stamp <= until {
@@ -205,7 +212,7 @@ fn drive(job: &Job, fixes: &[Fix], until: Nanos) -> Result<Driven, Failure> {
         }
         track.push(odometry);
     }
-    Ok(Driven { track, taken, first: first.unwrap_or_default(), then })
+    Ok(Driven { track, taken, widened, first: first.unwrap_or_default(), then })
 }
 
 /// What was known at first and then, of the parameters that the drive's sensors have to do with.

@@ -193,7 +193,8 @@ fn lesson_as_json(lesson: &Lesson) -> Value {
         })
     };
     json!({
-        "share": lesson.share, "given": lesson.given, "taken": lesson.taken, "parameters": parameters,
+        "share": lesson.share, "given": lesson.given, "taken": lesson.taken,
+        "widened": lesson.widened, "parameters": parameters,
         "rest": { "without": rest(&lesson.without), "with": rest(&lesson.with) },
     })
 }
@@ -204,9 +205,18 @@ fn print_lesson(lesson: &Lesson) {
         "fixes over the first {percent:.0} % of the time: {} of {} taken",
         lesson.taken, lesson.given
     );
+    if lesson.widened > 0 {
+        let times = if lesson.widened == 1 {
+            "once".to_owned()
+        } else {
+            format!("{} times", lesson.widened)
+        };
+        println!("the covariance was too small for the vehicle's true numbers: widened {times},");
+        println!("after five fixes in a row that contradicted it alike");
+    }
     if lesson.taken < lesson.given {
         println!("the others contradict the pose beyond what [calibration] or [uncertainty] of");
-        println!("vehicle.toml leaves open: calibrate first, or state more");
+        println!("vehicle.toml leaves open");
     }
     let header = ["parameter", "vehicle.toml", "learnt", "95 %", "before"];
     let mut table = tables::figures(&header, &[1, 2, 3, 4]);

@@ -1,17 +1,18 @@
 //! A calibration and all that a report needs of it.
 
-use kerbside_geometry::{Vehicle, math};
+use kerbside_geometry::{Gyro, Vehicle, math};
 
-use crate::chain::Square;
 use crate::closed_form::{ClosedForm, closed_form};
 use crate::condense::Condensed;
 use crate::diagnose::{Finding, diagnose_runs};
 use crate::error::CalibrationError;
+use crate::gyro::GyroBias;
 use crate::information::{Information, prior};
 use crate::joint::{JointFit, Rejected, RunResiduals, joint_fit};
 use crate::left_out::{LeftOut, left_out};
 use crate::missing::{Missing, missing};
 use crate::noise::Settings;
+use crate::normal::Square;
 use crate::parameters::{PARAMETERS, Parameter, Parameters, Vector};
 use crate::run::Run;
 use crate::steering_check::{SteeringCheck, check_steering};
@@ -65,6 +66,8 @@ pub struct Calibrated {
     /// Variances of the parameters from drive to drive, beyond what the readings' noise explains; 0 where there is nothing
     /// beyond. The next drive's parameters scatter about these by both.
     pub between: Vector,
+    /// What the gyro reads at rest; none where it does not tell of the turn.
+    pub gyro_bias: Option<GyroBias>,
     /// What the runs told, priors excluded.
     pub information: Information,
     /// Epsilons (the paper's, left minus right) and ratios.
@@ -121,11 +124,12 @@ pub fn calibrate(
     let p = &fit.parameters;
     let counted: Vec<&Run> = counting.iter().map(|index| kept[*index]).collect();
     Ok(Calibrated {
-        vehicle: p.applied(vehicle),
+        vehicle: with_bias(p.applied(vehicle), fit.gyro_bias),
         parameters: *p,
         estimates: estimates(&fit, vehicle),
         covariance: fit.covariance,
         between: fit.between,
+        gyro_bias: fit.gyro_bias,
         derived: derived(&fit, &prior.scale),
         inflation: fit.inflation,
         truth_mean_square: fit.truth,
@@ -142,6 +146,12 @@ pub fn calibrate(
         rejected,
         findings,
     })
+}
+
+/// `vehicle` with what its gyro was found to read at rest.
+fn with_bias(vehicle: Vehicle, found: Option<GyroBias>) -> Vehicle {
+    let bias = |gyro: Gyro| Gyro { bias: found.map_or(gyro.bias, |found| found.value), ..gyro };
+    Vehicle { gyro: vehicle.gyro.map(bias), ..vehicle }
 }
 
 /// The runs that can be used, condensed; and those that cannot, with why.

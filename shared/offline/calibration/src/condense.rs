@@ -1,23 +1,15 @@
 //! A run, cut into blocks of a few centimetres: all that the fit needs of it, whatever the parameters.
 
-use kerbside_geometry::{Pose, Vehicle, WHEELS};
+use kerbside_geometry::{Pose, Vehicle};
 
+use crate::cells::{Cells, Reading};
 use crate::error::CalibrationError;
 use crate::gyro::{Gyro, Turned};
+use crate::known::{Known, is_agreed, known_of, looks_at};
 use crate::noise::Settings;
 use crate::parameters::Parameters;
-use crate::run::{ReferencePose, Run, Series};
-
-/// The steering readings within a block, weighed by travel.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Reading {
-    /// Mean \[rad\].
-    pub(crate) mean: f64,
-    /// How far the true angle strays from it within the block, standard deviation \[rad\].
-    pub(crate) spread: f64,
-    /// Variance of the mean over that of one reading.
-    pub(crate) variance_factor: f64,
-}
+use crate::run::Run;
+use crate::travel::Base;
 
 /// Motion between two instants, in one direction of travel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,19 +30,6 @@ pub(crate) struct Block {
     pub(crate) until: f64,
     /// Number of the comparison that the block belongs to.
     pub(crate) comparison: usize,
-}
-
-/// Something known of the motion besides wheels and steering.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Known {
-    /// The marker's pose and its standard deviations \[m\], \[rad\].
-    Pose { x: f64, y: f64, yaw: Option<f64>, position_deviation: f64, yaw_deviation: f64 },
-    /// Travelled distance and its standard deviation \[m\].
-    Distance(f64, f64),
-    /// Net turn and its standard deviation \[rad\].
-    Turn(f64, f64),
-    /// The turn since the gyro was last looked at, its bias in it.
-    Gyro(Turned),
 }
 
 /// Something known, and how many blocks were rolled by then.
@@ -86,14 +65,8 @@ pub(crate) struct Condensed {
     pub(crate) begin: f64,
 }
 
-/// Share of the wheels' travel below which the vehicle turns on the spot.
-const SPIN: f64 = 0.2;
 /// Variance of a turn of which nothing is known \[rad^2\].
 const ANYHOW: f64 = 1.0;
-/// Time to either side over which a speed is taken \[s\].
-const ABOUT: f64 = 0.2;
-/// Poses of the start that are known by agreement are as good as exact \[m\], \[rad\].
-const AGREED: f64 = 1e-6;
 
 impl Condensed {
     /// Cuts `run` into blocks.
@@ -237,10 +210,6 @@ fn comparison(rolled: f64, settings: &Settings) -> usize {
     number
 }
 
-fn is_agreed(known: &Known) -> bool {
-    matches!(known, Known::Pose { position_deviation, .. } if *position_deviation <= AGREED)
-}
-
 /// Without a steering sensor the curvature comes from the rear wheels, whose noise bends it: longer blocks make
 /// that harmless.
 fn block_length(settings: &Settings, steered: bool, wheels: [bool; 4]) -> f64 {
@@ -263,250 +232,8 @@ fn usable(mut wheels: [bool; 4], steered: bool, vehicle: &Vehicle) -> Option<[bo
     wheels.iter().any(|used| *used).then_some(wheels)
 }
 
-/// Everything known of the run besides wheels and steering, with the time it was known.
-fn known_of(run: &Run, settings: &Settings, (from, to): (f64, f64)) -> Vec<(f64, Known)> {
-    let noise = &settings.noise;
-    let mut known = Vec::new();
-    let pose = |pose: &Pose, deviation: f64, yaw_deviation: f64| Known::Pose {
-        x: pose.x,
-        y: pose.y,
-        yaw: Some(pose.yaw),
-        position_deviation: deviation,
-        yaw_deviation,
-    };
-    for reading in thinned(&run.reference, noise.reference_interval, (from, to)) {
-        let pose = Known::Pose {
-            x: reading.x,
-            y: reading.y,
-            yaw: reading.yaw,
-            position_deviation: noise.position,
-            yaw_deviation: noise.yaw,
-        };
-        known.push((reading.t.clamp(from, to), pose));
-    }
-    // What was measured by hand is relative to the start, wherever that is; a reference of its own makes it
-    // superfluous.
-    if run.reference.is_empty() {
-        let start = run.start.unwrap_or_default();
-        known.push((from, pose(&start, AGREED, AGREED)));
-        if let Some(end) = run.end_pose {
-            let end = start.compose(&end);
-            known.push((to, pose(&end, noise.hand_position, noise.hand_yaw)));
-        }
-    }
-    known.extend(run.distance.map(|distance| (to, Known::Distance(distance, noise.distance))));
-    known.extend(run.net_turn.map(|turn| (to, Known::Turn(turn, noise.turn))));
-    known
-}
-
-/// What a gyro turned over each stretch on which the axles are compared.
-fn looks_at(gyro: &Gyro<'_>, base: &Base, settings: &Settings) -> Vec<(f64, Known)> {
-    let mut from = base.span().0;
-    let mut looks = Vec::new();
-    for to in base.boundaries(settings.comparison) {
-        // Over a silence nothing is said: the next look begins behind it.
-        let silent = Turned { turn: 0.0, time: 0.0, variance: f64::INFINITY };
-        let turned = gyro.turned(from, to, &settings.noise).unwrap_or(silent);
-        if to > from {
-            looks.push((to, Known::Gyro(turned)));
-        }
-        from = to;
-    }
-    looks
-}
-
-/// Readings within the run's span that are far enough from one another; first and last stay in any case.
-fn thinned(
-    reference: &[ReferencePose],
-    interval: f64,
-    (from, to): (f64, f64),
-) -> Vec<ReferencePose> {
-    let margin = interval.max(0.1);
-    let inside = |reading: &&ReferencePose| (from - margin..=to + margin).contains(&reading.t);
-    let mut kept: Vec<ReferencePose> = Vec::new();
-    for reading in reference.iter().filter(inside) {
-        if kept.last().is_none_or(|last| reading.t - last.t >= interval) {
-            kept.push(*reading);
-        }
-    }
-    if let Some(last) = reference.iter().rfind(inside)
-        && kept.last().is_some_and(|kept| kept.t < last.t)
-    {
-        if kept.len() > 1 {
-            kept.pop();
-        }
-        kept.push(*last);
-    }
-    kept
-}
-
 fn rotation(run: &Run, from: f64, to: f64) -> [f64; 4] {
     core::array::from_fn(|wheel| {
         run.rotation[wheel].as_ref().map_or(0.0, |series| series.at(to) - series.at(from))
     })
-}
-
-/// The wheels' common travel over time, by nominal radii.
-pub(crate) struct Base {
-    t: Vec<f64>,
-    /// Travel, reverse counted like forward \[m\].
-    rolled: Vec<f64>,
-    /// Travel, reverse negative \[m\].
-    net: Vec<f64>,
-}
-
-impl Base {
-    /// None without a wheel that was read twice.
-    pub(crate) fn new(run: &Run, vehicle: &Vehicle) -> Option<Self> {
-        let used = run.wheels();
-        let (from, to) = run.span()?;
-        let wheels: Vec<(&Series, f64)> = WHEELS
-            .iter()
-            .filter(|wheel| used[wheel.index()])
-            .filter_map(|wheel| {
-                Some((run.rotation[wheel.index()].as_ref()?, vehicle.radius[wheel.index()]))
-            })
-            .collect();
-        let clock = wheels.iter().max_by_key(|(series, _)| series.len())?.0;
-        let inside = |t: &f64| (from..=to).contains(t);
-        let t: Vec<f64> = clock.t.iter().copied().filter(inside).collect();
-        if t.len() < 2 {
-            return None;
-        }
-        #[allow(clippy::cast_precision_loss)] // four at most
-        let share = 1.0 / wheels.len() as f64;
-        let mean =
-            |t: f64| wheels.iter().map(|(wheel, radius)| wheel.at(t) * radius).sum::<f64>() * share;
-        let net: Vec<f64> = t.iter().map(|t| mean(*t)).collect();
-        let mut rolled = vec![0.0; net.len()];
-        // Wheel by wheel: a vehicle that turns on the spot rolls, too.
-        for (wheel, radius) in &wheels {
-            let (mut before, mut sum) = (wheel.at(from), 0.0);
-            for (rolled, t) in rolled.iter_mut().zip(&t) {
-                let now = wheel.at(*t);
-                sum += (now - before).abs() * radius * share;
-                *rolled += sum;
-                before = now;
-            }
-        }
-        Some(Self { t, rolled, net })
-    }
-
-    pub(crate) fn travel(&self) -> f64 {
-        self.rolled.last().copied().unwrap_or(0.0)
-    }
-
-    /// Travel with its direction, reverse against forward, without sign \[m\].
-    pub(crate) fn net(&self) -> f64 {
-        (self.net[self.net.len() - 1] - self.net[0]).abs()
-    }
-
-    pub(crate) fn span(&self) -> (f64, f64) {
-        (self.t[0], self.t[self.t.len() - 1])
-    }
-
-    fn interpolate(&self, values: &[f64], t: f64) -> f64 {
-        let after = self.t.partition_point(|stamp| *stamp <= t);
-        if after == 0 {
-            return values[0];
-        }
-        if after == self.t.len() {
-            return values[after - 1];
-        }
-        let share = (t - self.t[after - 1]) / (self.t[after] - self.t[after - 1]);
-        values[after - 1] + share * (values[after] - values[after - 1])
-    }
-
-    /// Travel by `t` \[m\].
-    pub(crate) fn rolled(&self, t: f64) -> f64 {
-        self.interpolate(&self.rolled, t)
-    }
-
-    /// Speed of the common travel about `t`, without sign \[m/s\].
-    fn speed(&self, t: f64) -> f64 {
-        let (begin, end) = self.span();
-        let (from, to) = ((t - ABOUT).max(begin), (t + ABOUT).min(end));
-        if to > from { (self.rolled(to) - self.rolled(from)) / (to - from) } else { 0.0 }
-    }
-
-    fn direction(&self, from: f64, to: f64) -> f64 {
-        let net = self.interpolate(&self.net, to) - self.interpolate(&self.net, from);
-        if net < 0.0 { -1.0 } else { 1.0 }
-    }
-
-    /// Ends of blocks of about `length` \[m\], and every change of the direction of travel.
-    fn boundaries(&self, length: f64) -> Vec<f64> {
-        let mut times = Vec::new();
-        let (mut begun, mut direction) = (0.0, 0.0);
-        for index in 1..self.t.len() {
-            let step = self.net[index] - self.net[index - 1];
-            // On the spot there is no direction of travel to change.
-            let spins = step.abs() < SPIN * (self.rolled[index] - self.rolled[index - 1]);
-            let step = if spins { 0.0 } else { step };
-            if step * direction < 0.0 && self.rolled[index - 1] > begun {
-                times.push(self.t[index - 1]);
-                begun = self.rolled[index - 1];
-            }
-            direction = if step == 0.0 { direction } else { step };
-            if self.rolled[index] - begun >= length {
-                times.push(self.t[index]);
-                begun = self.rolled[index];
-            }
-        }
-        times.push(self.t[self.t.len() - 1]);
-        times
-    }
-}
-
-/// Steering readings, each holding for the travel nearest to it in time.
-struct Cells {
-    /// Travel at the cell's beginning and end \[m\], and the reading \[rad\].
-    cells: Vec<(f64, f64, f64)>,
-    at: usize,
-}
-
-impl Cells {
-    fn new(series: &Series, base: &Base) -> Self {
-        let count = series.len();
-        let edge = |index: usize| match index {
-            0 => 0.0,
-            _ if index >= count => base.travel(),
-            _ => base.rolled(0.5 * (series.t[index - 1] + series.t[index])),
-        };
-        let cells: Vec<_> =
-            (0..count).map(|index| (edge(index), edge(index + 1), series.value[index])).collect();
-        let cells = cells.into_iter().filter(|(from, to, _)| to > from).collect();
-        Self { cells, at: 0 }
-    }
-
-    /// The readings between two travels, in ascending order of calls.
-    fn read(&mut self, from: f64, to: f64, settings: &Settings) -> Reading {
-        while self.at + 1 < self.cells.len() && self.cells[self.at].1 <= from {
-            self.at += 1;
-        }
-        let (mut sum, mut first, mut second, mut error) = (0.0, 0.0, 0.0, 0.0);
-        for (begin, end, reading) in &self.cells[self.at..] {
-            if *begin >= to {
-                break;
-            }
-            let weight = end.min(to) - begin.max(from);
-            if weight <= 0.0 {
-                continue;
-            }
-            sum += weight;
-            first += weight * reading;
-            second += weight * reading * reading;
-            // Half a cell's error is the other half's too: counted so, the blocks' sum is right.
-            error += weight * (end - begin);
-        }
-        if sum <= 0.0 {
-            let mean = self.cells.get(self.at).map_or(0.0, |(_, _, reading)| *reading);
-            return Reading { mean, spread: 0.0, variance_factor: 1.0 };
-        }
-        let mean = first / sum;
-        let noise = settings.noise.steering * settings.noise.steering;
-        let variance = second / sum - mean * mean - noise;
-        let spread = if variance > 3.0 * noise { variance.sqrt() } else { 0.0 };
-        Reading { mean, spread, variance_factor: error / (sum * sum) }
-    }
 }

@@ -19,6 +19,45 @@ pub(crate) struct Turned {
     pub(crate) variance: f64,
 }
 
+/// What a gyro reads at rest, over the runs of a calibration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GyroBias {
+    /// Mean over the runs \[rad/s\].
+    pub value: f64,
+    /// Standard deviation of the next run's about it, by what the runs differ \[rad/s\]; none of one run alone.
+    pub deviation: Option<f64>,
+}
+
+impl GyroBias {
+    /// Of biases with their variances, one a run: weighed by these and by the variance from run to run, which is that of
+    /// DerSimonian and Laird (1986). None without a run.
+    pub(crate) fn of(runs: &[(f64, f64)]) -> Option<Self> {
+        let mean = |between: f64| {
+            let weights = runs.iter().map(|run| 1.0 / (run.1 + between).max(LEAST_VARIANCE));
+            let (sum, total) = weights.zip(runs).fold((0.0, 0.0), |(sum, total), (weight, run)| {
+                (sum + weight * run.0, total + weight)
+            });
+            (sum / total, total)
+        };
+        let weights = || runs.iter().map(|run| 1.0 / run.1.max(LEAST_VARIANCE));
+        let [_, ..] = runs else { return None };
+        let (alone, total) = mean(0.0);
+        if runs.len() == 1 {
+            return Some(Self { value: alone, deviation: None });
+        }
+        let apart: f64 = weights().zip(runs).map(|(w, run)| w * (run.0 - alone).powi(2)).sum();
+        let squares: f64 = weights().map(|weight| weight * weight).sum();
+        #[allow(clippy::cast_precision_loss)] // runs
+        let freedom = (runs.len() - 1) as f64;
+        let between = ((apart - freedom) / (total - squares / total)).max(0.0);
+        let (value, total) = mean(between);
+        Some(Self { value, deviation: Some((between + 1.0 / total).sqrt()) })
+    }
+}
+
+/// A gyro that is known exactly would leave nothing to weigh \[rad^2/s^2\].
+const LEAST_VARIANCE: f64 = 1e-14;
+
 /// A gyro's readings, ready for windows.
 #[derive(Clone, Debug)]
 pub(crate) struct Gyro<'a> {
@@ -104,5 +143,20 @@ mod tests {
         let gyro = Gyro::new(&series).unwrap();
         assert!(gyro.turned(0.1, 2.05, &noise).is_none());
         assert!(gyro.turned(0.0, 0.15, &noise).is_some());
+    }
+
+    #[test]
+    fn biases_are_weighed_and_their_scatter_is_told() {
+        assert_eq!(GyroBias::of(&[]), None);
+        assert_eq!(GyroBias::of(&[(0.01, 1e-8)]), Some(GyroBias { value: 0.01, deviation: None }));
+        // Apart by far more than they are uncertain: the mean, and how they scatter.
+        let found = GyroBias::of(&[(0.001, 1e-10), (0.003, 1e-10), (0.005, 1e-10)]).unwrap();
+        assert!((found.value - 0.003).abs() < 1e-6, "{found:?}");
+        let deviation = found.deviation.unwrap();
+        assert!((deviation - (4e-6_f64 * (1.0 + 1.0 / 3.0)).sqrt()).abs() < 1e-5, "{deviation}");
+        // As chance puts them: the better known one counts more.
+        let found = GyroBias::of(&[(0.0, 1e-6), (0.0005, 4e-6)]).unwrap();
+        assert!((found.value - 0.0001).abs() < 1e-9, "{found:?}");
+        assert!((found.deviation.unwrap() - 8e-7_f64.sqrt()).abs() < 1e-9);
     }
 }

@@ -3,10 +3,10 @@
 use kerbside_geometry::Vehicle;
 use nalgebra::SymmetricEigen;
 
-use crate::chain::Square;
 use crate::condense::Condensed;
 use crate::error::CalibrationError;
 use crate::noise::Settings;
+use crate::normal::Square;
 use crate::parameters::{COUNT, PARAMETERS, Parameter, Parameters, Vector};
 use crate::run::Run;
 use crate::solve::{Fit, Prior, first_start};

@@ -3,11 +3,13 @@
 use kerbside_geometry::{Pose, Vehicle};
 
 use crate::between::between;
-use crate::chain::{Normal, Square, Squares};
 use crate::condense::Condensed;
 use crate::error::CalibrationError;
+use crate::gyro::GyroBias;
 use crate::information::{Information, only_where_open, prior};
+use crate::kinds::kinds;
 use crate::noise::Settings;
+use crate::normal::{Normal, Square, Squares};
 use crate::parameters::{COUNT, Parameters, Vector};
 use crate::solve::{Fit, Prior, first_start, fit};
 
@@ -52,6 +54,8 @@ pub(crate) struct JointFit {
     pub(crate) inflation: f64,
     /// Variances of the parameters from drive to drive; 0 where chance explains what differs.
     pub(crate) between: Vector,
+    /// What the gyro reads at rest, where it tells of the turn.
+    pub(crate) gyro_bias: Option<GyroBias>,
     /// Mean squares of the residuals of poses and of comparisons.
     pub(crate) truth: f64,
     pub(crate) comparison: f64,
@@ -233,7 +237,8 @@ fn finish(
     information.identified = core::array::from_fn(|i| told.identified[i] && fit.free[i]);
     let open = held(prior, &fit, settings);
     let values = &fit.parameters.values;
-    let differs = between(&fit.normals, values, &information.identified, &open);
+    let kinds = kinds(runs, &fit.parameters, settings);
+    let differs = between(&fit.normals, &kinds, values, &information.identified, &open);
     let held = Information { matrix: information.matrix + open.weight, ..information.clone() };
     let covariance = held.covariance(&prior.scale).ok_or(CalibrationError::Diverged)?;
     let (truth, comparison) = totals(&fit);
@@ -251,6 +256,7 @@ fn finish(
         Some(differs) => covariance * differs.within + covariance * differs.score * covariance,
         None => covariance * inflation,
     };
+    let biases: Vec<(f64, f64)> = fit.normals.iter().filter_map(|normal| normal.bias).collect();
     let residuals = runs.iter().zip(&fit.normals).zip(&fit.starts);
     let residuals = residuals.map(|((run, normal), start)| residuals_of(run, normal, start));
     Ok(JointFit {
@@ -259,6 +265,7 @@ fn finish(
         covariance,
         inflation,
         between: differs.map_or_else(Vector::zeros, |differs| differs.variance),
+        gyro_bias: GyroBias::of(&biases),
         truth: truth_mean,
         comparison: comparison_mean,
         freedom,

@@ -3,10 +3,10 @@
 use kerbside_geometry::{Pose, Vehicle, angle, math};
 
 use crate::ackermann::wheel_angle;
-use crate::condense::Base;
 use crate::noise::Noise;
 use crate::parameters::{Parameter, Parameters};
 use crate::run::Run;
+use crate::travel::Base;
 
 /// Heading up to which a run counts as straight all along \[rad\], and what nominal radii add that differ by half a
 /// per cent.

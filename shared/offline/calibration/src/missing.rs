@@ -4,10 +4,10 @@ use core::f64::consts::TAU;
 
 use kerbside_geometry::{Pose, Vehicle, math};
 
-use crate::chain::Square;
 use crate::condense::Condensed;
 use crate::information::Information;
 use crate::noise::Settings;
+use crate::normal::Square;
 use crate::parameters::{PARAMETERS, Parameter, Parameters};
 use crate::run::{ReferencePose, Run, Series};
 use crate::solve::{Fit, Prior, first_start};
@@ -34,6 +34,24 @@ struct Drive {
     by_tape: bool,
 }
 
+/// A manoeuvre, what it tells, and that with what the runs told.
+struct Candidate {
+    words: String,
+    added: Square,
+    with: Information,
+}
+
+impl Candidate {
+    /// Whether the runs and this identify `parameter`, and its readings depend on it enough to do so if all else were
+    /// known: a straight that only settles the steering's zero makes no wheelbase of a motorway's faint bends.
+    fn identifies(&self, parameter: Parameter, prior: &Prior, settings: &Settings) -> bool {
+        let (index, share) = (parameter.index(), settings.identified_share);
+        let scale = prior.scale[index];
+        let own = self.added[(index, index)] * scale * scale;
+        self.with.identified[index] && own * share * share >= 1.0
+    }
+}
+
 /// Names what each parameter that `information` leaves open needs; `like` says which sensors there are.
 pub(crate) fn missing(
     information: &Information,
@@ -53,21 +71,21 @@ pub(crate) fn missing(
         return found;
     }
     let garage = Garage { prior, like, vehicle, parameters, settings };
-    let candidates: Vec<(String, Information)> = manoeuvres(vehicle, parameters)
+    let candidates: Vec<Candidate> = manoeuvres(vehicle, parameters)
         .into_iter()
         .filter_map(|(words, drives)| {
             let added: Option<Vec<Square>> =
                 drives.iter().map(|drive| garage.information(drive)).collect();
-            let matrix = information.matrix + added?.iter().sum::<Square>() * REPEATS;
-            Some((words, Information::new(matrix, prior, settings)))
+            let added = added?.iter().sum::<Square>() * REPEATS;
+            let with = Information::new(information.matrix + added, prior, settings);
+            Some(Candidate { words, added, with })
         })
         .collect();
     for parameter in open {
-        let helps = |(_, with): &&(String, Information)| with.identified[parameter.index()];
-        let needs = candidates
-            .iter()
-            .find(helps)
-            .map_or_else(|| without_cure(like).to_owned(), |(words, _)| words.clone());
+        let helps = |candidate: &&Candidate| candidate.identifies(parameter, prior, settings);
+        let needs = candidates.iter().find(helps);
+        let needs = needs
+            .map_or_else(|| without_cure(like).to_owned(), |candidate| candidate.words.clone());
         found.push(Missing { parameter, needs });
     }
     found

@@ -2,8 +2,9 @@
 
 use kerbside_geometry::{Pose, Vehicle, angle, math};
 
-use crate::condense::{Condensed, Known};
+use crate::condense::Condensed;
 use crate::error::CalibrationError;
+use crate::known::Known;
 use crate::noise::Settings;
 use crate::parameters::Parameters;
 use crate::rows::{Rows, Used};

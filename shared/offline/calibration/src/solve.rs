@@ -2,10 +2,12 @@
 
 use kerbside_geometry::{Pose, angle, math};
 
-use crate::chain::{Normal, Square, evaluate};
-use crate::condense::{Condensed, Known};
+use crate::chain::evaluate;
+use crate::condense::Condensed;
 use crate::error::CalibrationError;
+use crate::known::Known;
 use crate::noise::Settings;
+use crate::normal::{Normal, Square};
 use crate::parameters::{Parameters, Vector};
 use crate::rows::{Rows, Used};
 

@@ -1,5 +1,7 @@
 //! A gyro in the fit: where it alone tells the heading, and where nothing else tells it.
 
+#![allow(clippy::float_cmp)] // The same number, handed on.
+
 use kerbside_calibration::{Parameter, ReferencePose, Run, Series, Settings, calibrate};
 use kerbside_geometry::{Gyro, Pose, Vehicle};
 
@@ -16,7 +18,10 @@ const LARGER: [f64; 2] = [1.01, 1.012];
 const WIDER: f64 = 1.03;
 
 fn car() -> Vehicle {
-    Vehicle { gyro: Some(Gyro { noise: 0.002, rate: f64::from(RATE) }), ..Vehicle::paper_car() }
+    Vehicle {
+        gyro: Some(Gyro { noise: 0.002, rate: f64::from(RATE), bias: 0.0 }),
+        ..Vehicle::paper_car()
+    }
 }
 
 /// A drive of 8 m at 0.25 m/s on circles of `curvature` \[1/m\], after a rest, by which the
@@ -92,4 +97,27 @@ fn one_wheel_and_a_gyro_are_enough_beside_positions() {
     assert!(estimate.identified);
     let error = estimate.value / radius - 1.0;
     assert!(error.abs() < 1e-3, "{error}");
+    let bias = found.gyro_bias.unwrap();
+    assert!((bias.value - BIAS).abs() < 5e-4, "{bias:?}");
+    assert!(bias.deviation.unwrap() < 2e-3, "{bias:?}");
+    assert_eq!(found.vehicle.gyro.unwrap().bias, bias.value);
+}
+
+/// Of one run alone nothing is said of the next one's bias.
+#[test]
+fn the_bias_of_one_run_comes_without_a_deviation() {
+    let mut car = car();
+    car.track_rear = 0.0;
+    let mut run = drive("left", 0.6, true);
+    run.rotation[3] = None;
+    let found = calibrate(&[run], &car, &Settings::of(&car)).unwrap();
+    let bias = found.gyro_bias.unwrap();
+    assert!((bias.value - BIAS).abs() < 2e-3 && bias.deviation.is_none(), "{bias:?}");
+    // Two wheels and a reference with headings tell the turn: nobody asks the gyro.
+    let mut run = drive("left", 0.6, true);
+    run.reference
+        .iter_mut()
+        .for_each(|pose| pose.yaw = Some(0.6 * 0.25 * (pose.t - REST).max(0.0)));
+    let found = calibrate(&[run], &self::car(), &Settings::of(&self::car())).unwrap();
+    assert_eq!(found.gyro_bias, None);
 }

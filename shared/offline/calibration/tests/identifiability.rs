@@ -51,6 +51,18 @@ fn straights_with_poses_leave_tracks_and_wheelbase_open() {
 }
 
 #[test]
+fn a_straight_is_not_named_for_the_wheelbase_of_faint_bends() {
+    let mut car = fine();
+    car.reference = (0.05, 0.01);
+    for (radius, turn) in [(100.0, 0.1), (60.0, 0.2), (40.0, 0.25)] {
+        let found = calibrated(&car, &[car.circle("bend", radius, turn, 7)]);
+        let estimate = found.estimate(Parameter::Wheelbase).expect("a wheelbase");
+        let needed = needs(&found, Parameter::Wheelbase);
+        assert!(estimate.identified || needed.contains("circles"), "{radius} m: {needed}");
+    }
+}
+
+#[test]
 fn arcs_alone_leave_the_scale_open_and_give_ratios() {
     let mut car = fine();
     car.reference = (0.05, 0.002);

@@ -55,9 +55,11 @@ impl Chassis {
             steering_sensor: sensors
                 .steering
                 .map(|sensor| kerbside_geometry::SteeringSensor::new(sensor.white, sensor.rate)),
-            gyro: sensors
-                .gyro
-                .map(|gyro| kerbside_geometry::Gyro { noise: gyro.white, rate: gyro.rate }),
+            gyro: sensors.gyro.map(|gyro| kerbside_geometry::Gyro {
+                noise: gyro.white,
+                rate: gyro.rate,
+                bias: 0.0,
+            }),
             reference: sensors.reference.map(|reference| kerbside_geometry::Reference {
                 position_noise: reference.position_white,
                 yaw_noise: reference.yaw_white,

@@ -167,10 +167,29 @@ fn found(
 }
 
 impl Told {
-    /// By calibrations in `yard`.
+    /// By a calibration in `yard`.
     pub(crate) fn by(yard: &Yard, seed: u64) -> Result<Self, ReproductionError> {
+        let centre = Self::centre(yard, seed)?;
+        Self::about(centre, yard, seed)
+    }
+
+    /// By each of `count` calibrations in `yard`: what one finds of how far its runs differ is itself left to chance.
+    pub(crate) fn by_many(
+        yard: &Yard,
+        count: u64,
+        seed: impl Fn(u64) -> u64,
+    ) -> Result<Vec<Self>, ReproductionError> {
+        let centre = Self::centre(yard, seed(0))?;
+        (0..count).map(|number| Self::about(centre, yard, seed(number))).collect()
+    }
+
+    /// What a calibration finds whose sensors do not err.
+    fn centre(yard: &Yard, seed: u64) -> Result<Parameters, ReproductionError> {
         let quiet = Yard { sensors: yard.sensors.clone().without_errors(), ..yard.clone() };
-        let centre = Self::calibrate(&quiet, yard, seed)?.parameters;
+        Ok(Self::calibrate(&quiet, yard, seed)?.parameters)
+    }
+
+    fn about(centre: Parameters, yard: &Yard, seed: u64) -> Result<Self, ReproductionError> {
         let calibrated = Self::calibrate(yard, yard, seed)?;
         let covariance = calibrated.covariance.fixed_view::<IDENTIFIED, IDENTIFIED>(0, 0);
         let root = covariance.into_owned().cholesky().map(|cholesky| cholesky.l());

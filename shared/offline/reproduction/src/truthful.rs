@@ -22,6 +22,8 @@ pub const LENGTHS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 const CONTENDERS: [Contender; 3] = [Contender::PaperOwn, Contender::Paper, Contender::Fused];
 /// Strengths of the physics that are driven.
 pub const STRENGTHS: [f64; 4] = [0.0, 0.25, 0.5, 1.0];
+/// Calibrations that the filter is told of, in turn, at each strength.
+const CALIBRATIONS: u64 = 8;
 /// An encoder fails after so much time \[s\].
 const FAILS: f64 = 8.0;
 
@@ -199,13 +201,14 @@ pub(crate) fn circumstances(
     let mut allowed = None;
     for (number, strength) in STRENGTHS.into_iter().enumerate() {
         let case = 600 + number as u64;
-        let told = Told::by(&Circumstances::physical(strength, case).yard, seed_of(seed, case, 0))?;
+        let yard = Circumstances::physical(strength, case).yard;
+        let told = Told::by_many(&yard, CALIBRATIONS, |number| seed_of(seed, case, number))?;
         for speed in SPEEDS {
             let asked = (trials, seed);
             rows.push(with_physics(strength, speed, &told, asked, progress)?);
         }
         if strength >= 1.0 {
-            let told = told.with_allowance();
+            let told: Vec<Told> = told.into_iter().map(Told::with_allowance).collect();
             let mut row = with_physics(strength, SPEEDS[0], &told, (trials, seed), progress)?;
             row.name.push_str(", ordinary allowance");
             row.accept = Accept::Shown;
@@ -220,7 +223,7 @@ pub(crate) fn circumstances(
 fn with_physics(
     strength: f64,
     speed: f64,
-    told: &Told,
+    told: &[Told],
     (trials, seed): (usize, u64),
     progress: &mut Progress<'_>,
 ) -> Result<Circumstance, ReproductionError> {
@@ -236,7 +239,8 @@ fn with_physics(
         seed: (seed, 700 + (100.0 * strength + 1e5 * speed) as u64),
         trials,
     };
-    let trial_of = |seed: u64| told.trial(seed);
+    #[allow(clippy::cast_possible_truncation)] // a remainder
+    let trial_of = |seed: u64| told[(seed % told.len() as u64) as usize].trial(seed);
     let pair = [Contender::Rear, Contender::Fused];
     let spreads = scatter(&course, &pair, &trial_of, progress)?;
     let accept =

@@ -18,7 +18,7 @@ const STEPS: u32 = 2_000;
 const AIM: f64 = 30_000.0;
 
 fn vehicle() -> Vehicle {
-    Vehicle { gyro: Some(Gyro { noise: 0.003, rate: 200.0 }), ..Vehicle::paper_car() }
+    Vehicle { gyro: Some(Gyro { noise: 0.003, rate: 200.0, bias: 0.0 }), ..Vehicle::paper_car() }
 }
 
 /// Commands that change every 50 ms, so that nothing ever settles.

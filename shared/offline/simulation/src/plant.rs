@@ -177,7 +177,7 @@ impl Plant {
                 steering_offset: sensor
                     .map_or(0.0, |sensor| sensor.offset + sensor.gain * response.steering_offset),
                 gyro_gain: 1.0,
-                gyro_bias: 0.0,
+                gyro_bias: vehicle.gyro.map_or(0.0, |gyro| gyro.bias),
                 reference_delay: 0.0,
                 reference_scale: 1.0,
                 marker: vehicle.reference.map_or(Pose::default(), |reference| reference.marker),

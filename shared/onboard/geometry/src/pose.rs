@@ -50,7 +50,7 @@ impl Pose {
 
     /// The pose after rolling `distance` \[m\] (signed) along a circle on which the heading turns by `turn` \[rad\].
     ///
-    /// Exact for constant curvature (digest of the paper, equation (1), with the chord instead of the arc).
+    /// Exact for constant curvature (Lee, Chung and Chang, equation (1), with the chord instead of the arc).
     #[must_use]
     pub fn advance(&self, distance: f64, turn: f64) -> Self {
         let chord = distance * math::sinc(0.5 * turn);

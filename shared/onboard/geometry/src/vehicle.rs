@@ -179,6 +179,8 @@ pub struct Gyro {
     pub noise: f64,
     /// Readings per second \[Hz\].
     pub rate: f64,
+    /// What it reads at rest \[rad/s\].
+    pub bias: f64,
 }
 
 /// The reference sensor.

@@ -78,11 +78,11 @@ impl Parameter {
             Self::TrackFront => (vehicle.track_front, 1.0),
             Self::TrackRear => (vehicle.track_rear, 1.0),
             Self::Wheelbase => (vehicle.wheelbase, 1.0),
-            // Offset and gain are taken out of every reading before.
+            // Offset and gain are taken out of every reading before, and so is the gyro's bias.
             Self::SteeringZero => {
                 vehicle.steering_sensor.map_or((0.0, 1.0), |sensor| (sensor.offset, sensor.gain))
             }
-            Self::GyroBias => (0.0, 1.0),
+            Self::GyroBias => (vehicle.gyro.map_or(0.0, |gyro| gyro.bias), 1.0),
             radius => (vehicle.radius[radius.index()], vehicle.radius[radius.index()]),
         }
     }

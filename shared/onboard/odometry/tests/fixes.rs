@@ -5,7 +5,7 @@
 mod support;
 
 use kerbside_geometry::Pose;
-use kerbside_messages::{Fix, FixVerdict, Header, Odometry, Travel};
+use kerbside_messages::{Fix, FixVerdict, Header, Odometry, ResetReason, Travel};
 use kerbside_odometry::{
     Estimator, EstimatorInputs, EstimatorSettings, InitialPose, ParameterEstimate,
 };
@@ -193,4 +193,78 @@ fn fixes_tell_the_scale_that_wheels_alone_cannot() {
     assert!(out.covariance[0] < 1e-5);
     let eigenvalues = told.covariance.symmetric_eigenvalues();
     assert!(eigenvalues.min() > 0.0, "{eigenvalues}");
+}
+
+/// Travels of a car whose wheels are all larger by `share` than its file says, and the true poses.
+fn larger(seed: u64, share: f64) -> Vec<(Travel, Pose)> {
+    let mut travels = drive(seed);
+    let shrunk = |travel: &mut [f64; 4]| travel.iter_mut().for_each(|way| *way /= 1.0 + share);
+    for (travel, _) in &mut travels {
+        shrunk(&mut travel.travel);
+        shrunk(&mut travel.increment);
+    }
+    travels
+}
+
+/// Steps over `travels` with fixes every `every` from `seen`; what became of each, and the last odometry.
+fn judged(
+    travels: &[(Travel, Pose)],
+    every: usize,
+    seen: impl Fn(usize) -> Fix,
+) -> (Vec<FixVerdict>, Odometry, ParameterEstimate) {
+    let mut estimator = Estimator::new(&car(), &placed()).unwrap();
+    let (mut out, mut verdicts) = (Odometry::default(), Vec::new());
+    for (number, (travel, _)) in travels.iter().enumerate() {
+        let fix = (number > 0 && number.is_multiple_of(every)).then(|| seen(number));
+        let inputs = EstimatorInputs { travel, missing: 0, fix: fix.as_ref(), restore: None };
+        estimator.step(inputs, &mut out);
+        if fix.is_some() {
+            verdicts.push(FixVerdict::from_code(out.fix_verdict).unwrap());
+        }
+    }
+    (verdicts, out, estimator.parameters().unwrap())
+}
+
+#[test]
+fn fixes_that_agree_with_one_another_widen_a_covariance_that_was_too_small() {
+    // Eighty standard deviations of the prior.
+    let travels = larger(18, 0.04);
+    let (verdicts, out, learnt) = judged(&travels, 40, |at| seen(&travels, at));
+    let count = |verdict| verdicts.iter().filter(|said| **said == verdict).count();
+    let refused = count(FixVerdict::Moving);
+    assert!(count(FixVerdict::Widened) >= 1, "{verdicts:?}");
+    assert!(refused * 5 < verdicts.len(), "{refused} of {} refused", verdicts.len());
+    assert_eq!(out.reset_reason, ResetReason::Contradicted.code());
+    assert_eq!(out.resets as usize, 1 + count(FixVerdict::Widened));
+    let truth = travels.last().unwrap().1;
+    let off = Pose::new(out.x, out.y, out.yaw).distance(&truth);
+    assert!(off < 0.01, "{off} m");
+    let scale = learnt.deviation[..4].iter().sum::<f64>() / 4.0;
+    assert!((scale - 0.04).abs() < 0.006, "{scale}");
+}
+
+#[test]
+fn wrong_fixes_that_do_not_agree_are_refused_for_good() {
+    let travels = drive(19);
+    let wrong = |at: usize| {
+        let mut fix = seen(&travels, at);
+        let side = if (at / 40).is_multiple_of(2) { 1.0 } else { -1.0 };
+        (fix.x, fix.y) = (fix.x + 0.4 * side, fix.y - 0.3 * side);
+        fix
+    };
+    let (verdicts, out, _) = judged(&travels, 40, wrong);
+    assert!(verdicts.iter().all(|said| *said == FixVerdict::Moving), "{verdicts:?}");
+    assert_eq!((out.resets, out.reset_reason), (1, ResetReason::Initial.code()));
+    let off = Pose::new(out.x, out.y, out.yaw).distance(&travels.last().unwrap().1);
+    assert!(off < 0.15, "{off} m");
+}
+
+#[test]
+fn late_fixes_widen_the_past_that_they_are_of() {
+    let travels = larger(20, 0.04);
+    let late = |at: usize| seen(&travels, at.saturating_sub(60));
+    let (verdicts, out, _) = judged(&travels, 40, late);
+    assert!(verdicts.contains(&FixVerdict::Widened), "{verdicts:?}");
+    let off = Pose::new(out.x, out.y, out.yaw).distance(&travels.last().unwrap().1);
+    assert!(off < 0.02, "{off} m");
 }

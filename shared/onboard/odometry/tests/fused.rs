@@ -85,6 +85,17 @@ fn its_covariance_is_right_at_any_length_both_ways() {
 }
 
 #[test]
+fn its_covariance_is_right_at_any_speed() {
+    // From 0.3 m/s on eight readings are more than a block.
+    for (top, length) in [(0.3, 3.0), (0.5, 4.0), (1.0, 8.0)] {
+        let legs = straight_legs(length, top, 0.02);
+        let fused = outcome(&Case::new(Filter::Fused, 1.0, TRIALS), &legs);
+        println!("{top} m/s: NEES/3 {:.3}", fused.nees());
+        assert!((fused.nees() - 1.0).abs() < 0.1 + spread(), "{}", fused.nees());
+    }
+}
+
+#[test]
 fn a_spinning_wheel_is_found_and_its_axle_left_out() {
     let clean = outcome(&Case::new(Filter::Fused, 1.0, 100), &s_path());
     assert!(clean.flags() <= 0.02, "{}", clean.flags());

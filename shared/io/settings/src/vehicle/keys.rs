@@ -59,7 +59,7 @@ impl Default for VehicleDraft {
             noise_per_distance: None,
             encoder_rate: N,
             steering_sensor: SteeringSensor::new(N, N),
-            gyro: Gyro { noise: N, rate: N },
+            gyro: Gyro { noise: N, rate: N, bias: 0.0 },
             reference: Reference {
                 position_noise: N,
                 yaw_noise: N,
@@ -287,6 +287,13 @@ fn declare_sensors(schema: Schema<VehicleDraft>) -> Schema<VehicleDraft> {
             |v| &mut v.gyro.noise,
         )
         .required("gyro.rate", RATE, "Readings per second.", |v| &mut v.gyro.rate)
+        .key(
+            "gyro.bias",
+            Kind::unit("rad/s", Range::from(-1.0).to(1.0)),
+            "What it reads at rest; the estimator begins with it, as surely as `uncertainty.effect` states of \
+             `gyro_bias`.",
+            |v| &mut v.gyro.bias,
+        )
         .optional_section("reference", "The sensor of the reference pose. Absent: there is none.")
         .required(
             "reference.noise.position",

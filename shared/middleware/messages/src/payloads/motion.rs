@@ -124,6 +124,8 @@ codes! {
         Restored = 3 "restored",
         /// Counters started anew.
         CounterReset = 4 "counter reset",
+        /// Fixes contradicted the pose again and again and agreed with one another: it was less sure than it said.
+        Contradicted = 5 "contradicted by fixes",
     }
 }
 
@@ -142,6 +144,9 @@ codes! {
         Future = 4 "refused: stamp in the future",
         /// Not a covariance.
         Covariance = 5 "refused: covariance",
+        /// It agrees with the refused ones before it: the filter was too sure of itself, its covariance was widened, and
+        /// the fix corrected the pose.
+        Widened = 6 "accepted: the covariance was widened",
     }
 }
 

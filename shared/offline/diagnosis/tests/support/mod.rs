@@ -23,7 +23,7 @@ pub(crate) const ALL: Sensors = Sensors { steering: true, gyro: true, yaw: true 
 /// The paper's car with a gyro and a reference.
 pub(crate) fn vehicle() -> Vehicle {
     Vehicle {
-        gyro: Some(Gyro { noise: 0.003, rate: 40.0 }),
+        gyro: Some(Gyro { noise: 0.003, rate: 40.0, bias: 0.0 }),
         reference: Some(Reference {
             position_noise: 0.002,
             yaw_noise: 0.002,

@@ -86,8 +86,11 @@ fn described(dice: &mut Dice) -> Vehicle {
         encoders: encoders(dice, wheelbase),
         steering_sensor: sensor(dice, 0.8)
             .map(|rate| SteeringSensor::new(rounded(dice.between(0.0008, 0.003), 4), rate)),
-        gyro: sensor(dice, 0.78)
-            .map(|rate| Gyro { noise: rounded(dice.between(0.0015, 0.004), 4), rate }),
+        gyro: sensor(dice, 0.78).map(|rate| Gyro {
+            noise: rounded(dice.between(0.0015, 0.004), 4),
+            rate,
+            bias: 0.0,
+        }),
         reference: reference(dice, wheelbase),
     }
 }

@@ -207,7 +207,7 @@ fn a_live_drive_reads_what_a_whole_one_shows() {
     ]));
     let whole = trajectory(effects);
     let vehicle = Vehicle {
-        gyro: Some(kerbside_geometry::Gyro { noise: 0.003, rate: 100.0 }),
+        gyro: Some(kerbside_geometry::Gyro { noise: 0.003, rate: 100.0, bias: 0.0 }),
         ..Vehicle::paper_car()
     };
     let mut live = Simulator::with_effects(&vehicle, &effects, Pose::default(), &Noise::NONE, 0);

@@ -120,8 +120,11 @@ fn vehicle(root: &Table) -> Vehicle {
         }),
         steering_sensor: optional("steering_sensor")
             .map(|sensor| SteeringSensor::new(number(sensor, "noise"), number(sensor, "rate"))),
-        gyro: optional("gyro")
-            .map(|gyro| Gyro { noise: number(gyro, "noise"), rate: number(gyro, "rate") }),
+        gyro: optional("gyro").map(|gyro| Gyro {
+            noise: number(gyro, "noise"),
+            rate: number(gyro, "rate"),
+            bias: 0.0,
+        }),
         reference: optional("reference").map(reference),
     }
 }

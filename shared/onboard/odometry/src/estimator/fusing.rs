@@ -67,12 +67,20 @@ impl Estimator {
         }
     }
 
-    /// The fused filter corrects a valid pose by a fix, in motion as well. A fix that contradicts
+    /// The fused filter corrects a valid pose by a fix, in motion as well; where it had to widen its covariance for that, the
+    /// pose jumps, and the sample says so. A fix that contradicts
     /// it, and one without a pose to correct, sets the pose of a vehicle that stands.
     pub(super) fn corrected(&mut self, fix: &Fix, ruled: FixVerdict) -> FixVerdict {
         let judged = matches!(ruled, FixVerdict::Accepted | FixVerdict::Moving);
         let valid = self.state == EstimatorState::Valid;
         let taken = self.fused.as_mut().filter(|_| judged && valid).map(|fused| fused.fix(fix));
+        if let (Some(Taken::Widened), Some(fused)) = (taken, &self.fused) {
+            self.estimate = fused.estimate();
+            self.restorable = false;
+            self.reason = ResetReason::Contradicted;
+            self.resets = self.resets.wrapping_add(1);
+            return FixVerdict::Widened;
+        }
         if let (Some(Taken::Corrected), Some(fused)) = (taken, &self.fused) {
             self.estimate = fused.estimate();
             self.restorable = false;

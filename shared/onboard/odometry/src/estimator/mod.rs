@@ -66,7 +66,9 @@ pub struct EstimatorInputs<'a> {
 /// Without an initial pose it is relative to the start (`Unset`). A fix at standstill makes it
 /// `Valid`; the fused filter then takes further fixes in motion as well, each at its own time, late
 /// and out of order as far back as the last 512 readings in which a wheel turned, and refuses what
-/// its gate refuses. A fix that contradicts the pose of a vehicle that stands sets it. A new counter
+/// its gate refuses. Five that it refuses in a row and that agree with one another say that it is too sure of itself: its
+/// covariance is widened until the newest is an ordinary one, which then corrects pose and parameters, as a reset with
+/// [`ResetReason::Contradicted`]. A fix that contradicts the pose of a vehicle that stands sets it. A new counter
 /// epoch, or a gap over which no wheel can have turned so far, makes a valid pose `Lost`; it goes on
 /// from where it was, without a jump, until a fix comes. [`Restore`] is taken up once, if this life
 /// has no pose from a fix: its pose plus what rolled by since; from another counter epoch it is

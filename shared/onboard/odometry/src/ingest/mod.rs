@@ -50,6 +50,8 @@ pub struct Ingest {
     steering: SteeringSensor,
     largest_steering: f64,
     largest_yaw_rate: f64,
+    /// What the gyro reads at rest \[rad/s\].
+    gyro_bias: f64,
     counters: [Counter; 4],
     speedometers: [Speedometer; 4],
     clock: ClockMap,
@@ -96,6 +98,7 @@ impl Ingest {
             settings: settings.clone(),
             steering: vehicle.steering_sensor.unwrap_or(SteeringSensor::new(0.0, 0.0)),
             largest_steering: factor * vehicle.limits.steering + slack,
+            gyro_bias: vehicle.gyro.map_or(0.0, |gyro| gyro.bias),
             largest_yaw_rate: fastest * wheels::largest_curvature(vehicle) + 1.0,
             counters: scales.map(Counter::new),
             speedometers: scales
@@ -247,14 +250,15 @@ impl Ingest {
         !believed
     }
 
-    /// Takes the yaw rate; true if it is out of belief.
+    /// Takes the yaw rate, the gyro's bias taken out; true if it is out of belief.
     fn take_yaw_rate(&mut self, raw: &Raw) -> bool {
         if raw.has_yaw_rate != 1 || !self.sensors.gyro {
             return false;
         }
-        let believed = raw.yaw_rate.abs() <= self.largest_yaw_rate;
+        let rate = raw.yaw_rate - self.gyro_bias;
+        let believed = rate.abs() <= self.largest_yaw_rate;
         if believed {
-            self.newest.yaw_rate = raw.yaw_rate;
+            self.newest.yaw_rate = rate;
             (self.newest.has_yaw_rate, self.newest.yaw_rate_is_new) = (1, 1);
         }
         !believed

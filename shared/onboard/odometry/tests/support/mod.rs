@@ -29,7 +29,7 @@ pub(crate) fn car() -> Vehicle {
             noise_per_distance: None,
             rate: 200.0,
         }),
-        gyro: Some(Gyro { noise: 0.003, rate: 200.0 }),
+        gyro: Some(Gyro { noise: 0.003, rate: 200.0, bias: 0.0 }),
         reference: None,
         ..Vehicle::paper_car()
     }

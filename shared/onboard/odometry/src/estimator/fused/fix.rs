@@ -42,13 +42,17 @@ impl Sighting {
     /// How far it is off the estimate; where nothing at all is uncertain, without limit.
     pub(crate) fn surprise(&self, joint: &Joint) -> Surprise {
         let innovation = self.innovation(joint);
-        let by_pose = self.by_pose(joint);
-        let spread = by_pose * joint.estimate().covariance * by_pose.transpose();
-        let inverse = (spread + self.covariance).try_inverse();
+        let inverse = self.spread(joint).try_inverse();
         let ratio = inverse.map_or(f64::MAX, |inverse| {
             (innovation.transpose() * inverse * innovation).x.clamp(0.0, f64::MAX)
         });
         Surprise { innovation, ratio }
+    }
+
+    /// Covariance of what it says beyond the estimate.
+    pub(crate) fn spread(&self, joint: &Joint) -> Matrix3<f64> {
+        let by_pose = self.by_pose(joint);
+        by_pose * joint.estimate().covariance * by_pose.transpose() + self.covariance
     }
 
     /// Corrects pose and parameters.

@@ -116,6 +116,11 @@ impl History {
         self.fix_count += 1;
     }
 
+    /// What was believed at any time was believed too surely: see [`super::joint::Joint::widen`].
+    pub(crate) fn widen(&mut self, factor: f64) {
+        self.states.iter_mut().for_each(|kept| kept.state.joint.widen(factor));
+    }
+
     /// The fix under judgement is good, or it never was.
     pub(crate) fn settle(&mut self, good: bool) {
         let kept = &self.fixes[..self.fix_count];

@@ -162,6 +162,13 @@ impl Joint {
         self.pose_pose = estimate.covariance;
     }
 
+    /// Everything is less sure than it was said to be: variances times `factor`.
+    pub(crate) fn widen(&mut self, factor: f64) {
+        self.pose_pose *= factor;
+        self.pose_parameters *= factor;
+        self.parameters *= factor;
+    }
+
     /// Parameters change with time and distance: these variances are added.
     pub(crate) fn drift(&mut self, variances: &Values) {
         for index in 0..PARAMETERS {

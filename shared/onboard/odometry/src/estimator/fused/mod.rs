@@ -11,6 +11,7 @@
 mod algebra;
 mod axles;
 mod block;
+mod contradiction;
 mod fix;
 mod history;
 mod joint;
@@ -27,6 +28,7 @@ use super::increment::{Estimate, Increment};
 use crate::parameters::{Parameter, ParameterEstimate};
 use axles::Axle;
 use block::Verdict;
+use contradiction::Contradiction;
 use fix::Sighting;
 use history::History;
 pub(crate) use record::Turned;
@@ -83,6 +85,8 @@ pub(crate) struct Statistics {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Taken {
     Corrected,
+    /// The same, after the covariance was widened.
+    Widened,
     Contradicts,
     TooOld,
 }
@@ -102,6 +106,7 @@ pub(crate) struct Fused {
     slipped: f64,
     distrusted: [bool; 4],
     read: [bool; 4],
+    contradiction: Contradiction,
     statistics: Statistics,
 }
 
@@ -119,6 +124,7 @@ impl Fused {
             slipped: 0.0,
             distrusted: [false; 4],
             read: [false; 4],
+            contradiction: Contradiction::default(),
             statistics: Statistics::default(),
         }
     }
@@ -129,6 +135,7 @@ impl Fused {
         self.state.block.clear();
         self.history.forget();
         self.window = None;
+        self.contradiction.clear();
     }
 
     /// Writes down what a later life needs besides the pose.
@@ -359,13 +366,55 @@ impl Fused {
     }
 
     /// Takes an absolute pose at its own time; what was rolled since is gone through again.
+    ///
+    /// Where it contradicts the estimate as those before it did, the covariance is widened until it does not.
     pub(crate) fn fix(&mut self, fix: &Fix) -> Taken {
         let sighting = Sighting::new(fix);
+        let taken = self.judge(&sighting, self.setup.gate);
+        match taken {
+            Taken::Contradicts => {}
+            Taken::TooOld => return taken,
+            Taken::Corrected | Taken::Widened => {
+                self.contradiction.clear();
+                return taken;
+            }
+        }
+        let innovation = self.statistics.innovation.into();
+        let spread = sighting.spread(&self.state.joint);
+        if !self.contradiction.refused(innovation, &spread) {
+            return taken;
+        }
+        for _ in 0..contradiction::STEPS {
+            self.widen(contradiction::STEP);
+            if self.judge(&sighting, contradiction::ORDINARY) == Taken::Corrected {
+                self.contradiction.clear();
+                return Taken::Widened;
+            }
+        }
+        // Not even so: it stays as sure as it was. Powers of two leave nothing behind.
+        (0..contradiction::STEPS).for_each(|_| self.widen(1.0 / contradiction::STEP));
+        taken
+    }
+
+    fn widen(&mut self, factor: f64) {
+        self.state.joint.widen(factor);
+        self.history.widen(factor);
+    }
+
+    /// The same, refused beyond `gate`.
+    fn judge(&mut self, sighting: &Sighting, gate: f64) -> Taken {
+        let own = std::mem::replace(&mut self.setup.gate, gate);
+        let taken = self.take(sighting);
+        self.setup.gate = own;
+        taken
+    }
+
+    fn take(&mut self, sighting: &Sighting) -> Taken {
         self.state.judged = None;
         let before = self.state;
-        self.history.insert(&sighting);
+        self.history.insert(sighting);
         if sighting.stamp >= self.state.time {
-            self.state.correct(&self.setup, &sighting);
+            self.state.correct(&self.setup, sighting);
         } else {
             let Some(state) = self.history.again_before(&self.setup, sighting.stamp) else {
                 self.history.settle(false);

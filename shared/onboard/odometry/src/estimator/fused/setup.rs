@@ -108,7 +108,10 @@ impl Setup {
 
 /// A number that other measures or another prior do not share (FNV-1a over their bits); never 0.
 fn basis(vehicle: &Vehicle, prior: &ParameterPrior, scales: &[WheelScale; 4]) -> u64 {
-    let measures = [vehicle.wheelbase, vehicle.track_front, vehicle.track_rear];
+    let sensor = vehicle.steering_sensor.map_or((0.0, 1.0), |sensor| (sensor.offset, sensor.gain));
+    let bias = vehicle.gyro.map_or(0.0, |gyro| gyro.bias);
+    let (tracks, base) = ([vehicle.track_front, vehicle.track_rear], vehicle.wheelbase);
+    let measures = [base, tracks[0], tracks[1], sensor.0, sensor.1, bias];
     let counts = scales.iter().map(|scale| scale.metres_per_count);
     let numbers = measures.into_iter().chain(vehicle.radius).chain(counts);
     let all = numbers.chain(prior.covariance.iter().copied());

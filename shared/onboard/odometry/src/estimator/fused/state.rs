@@ -278,8 +278,10 @@ impl State {
     fn solve(&self, setup: &Setup, record: &Record) -> Option<Solved> {
         let centre = self.centre(record);
         let pending = self.pending + self.way(record, centre);
-        let whole = record.gap.is_some() || pending > setup.block;
-        let way = if whole { pending } else { SMOOTHING * pending };
+        // What is held back is a block at most, and leaves evenly: noise that grows with the square of the way would grow
+        // with every lump.
+        let smooth = (SMOOTHING * pending).max(pending - setup.block);
+        let way = if record.gap.is_some() { pending } else { smooth };
         let mut rows = self.rows(setup, record, centre, way);
         if record.gap.is_some() && record.rear_tells() {
             rows.iter_mut()
