@@ -44,6 +44,7 @@ pub fn of(found: &Diagnosis, facts: &Facts<'_>) -> Value {
         "verdict": found.verdict.name(),
         "sentence": found.sentence,
         "where": place(found),
+        "moved": found.moved.iter().map(|link| link.name()).collect::<Vec<_>>(),
         "effects": found.effects.iter().map(effect).collect::<Vec<_>>(),
         "alternatives": found.alternatives.iter().map(alternative).collect::<Vec<_>>(),
         "ranking": found.ranking.iter().map(pair).collect::<Vec<_>>(),

@@ -51,6 +51,7 @@ fn nothing() -> Diagnosis {
         verdict: Verdict::None,
         sentence: "The simulator is as good as these runs can tell.".to_owned(),
         links_named: Vec::new(),
+        moved: Vec::new(),
         effects: Vec::new(),
         alternatives: Vec::new(),
         ranking: vec![rival("none", 0.97), rival("gyro_gain", 0.02)],
@@ -83,6 +84,7 @@ pub fn two_effects() -> Diagnosis {
                    car drives 5 % slower than told."
             .to_owned(),
         links_named: vec![Link::SpeedActuation, Link::Sensing],
+        moved: vec![Link::SpeedActuation, Link::Sensing],
         effects: vec![loss, gain],
         alternatives: vec![Alternative { ids: vec!["count_loss", "speed_gain"], probability: 0.96 }],
         ranking: vec![rival("count_loss + speed_gain", 0.96), rival("unknown", 0.01)],
@@ -108,6 +110,7 @@ pub fn ambiguous() -> Diagnosis {
         sentence: "These runs cannot tell a limit of the acceleration from a longer lag."
             .to_owned(),
         links_named: vec![Link::SpeedActuation],
+        moved: vec![Link::SpeedActuation],
         effects: vec![effect(
             "acceleration_limit",
             Link::SpeedActuation,
@@ -131,6 +134,7 @@ pub fn of_every_verdict() -> Vec<Diagnosis> {
         verdict: Verdict::Unknown,
         sentence: "The car turns in by itself, and nothing that is listed does so.".to_owned(),
         links_named: vec![Link::Ground],
+        moved: vec![Link::Ground],
         ranking: vec![rival("unknown", 0.9)],
         ..nothing()
     };
@@ -138,6 +142,7 @@ pub fn of_every_verdict() -> Vec<Diagnosis> {
         verdict: Verdict::Mistake,
         sentence: "The gyro's yaw rate has the wrong sign.".to_owned(),
         links_named: vec![Link::Sensing],
+        moved: vec![Link::Sensing],
         mistake: Some(Mistake {
             kind: "sign",
             detail: "imu.csv: the yaw rate is the wheels' with the other sign".to_owned(),

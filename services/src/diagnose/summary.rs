@@ -48,6 +48,10 @@ fn page(diagnosed: &Diagnosed) -> String {
     lines.extend(chain(&found.links));
     let mut say = |name: &str, words: &str| lines.extend(named(name, words));
     say("where", &place(found));
+    if !found.moved.is_empty() {
+        let links: Vec<&str> = found.moved.iter().map(|link| link.name()).collect();
+        say("moved", &format!("{}, before any effect is fitted", links.join(" and ")));
+    }
     for (index, rival) in found.ranking.iter().take(RIVALS).enumerate() {
         let name = if index == 0 { "which" } else { "" };
         say(name, &format!("{:6}  {}", format::probability(rival.probability), rival.name));

@@ -3,7 +3,7 @@
 use kerbside_simulation::Effects;
 use rayon::prelude::*;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Whole};
 use crate::bins::{Channels, to_f64};
 use crate::candidate::{Candidate, candidates};
 use crate::case::Wheels;
@@ -11,10 +11,15 @@ use crate::fit::{Fit, Search};
 use crate::generic::{Axis, Entry};
 use crate::noise::{self, Noise};
 use crate::nuisance::Nuisance;
+use crate::outliers::white;
 use crate::prepare::Ready;
 use crate::rivals::{self, Shapes};
 use crate::search;
 
+/// Rows that show another noise than the usual one by this factor are believed.
+const CONTRADICTS: f64 = 4.0;
+/// Least noise of a speed, as a share of the limit.
+const LEAST: f64 = 1e-4;
 /// Singles from which pairs are grown.
 const KEEP: usize = 4;
 /// Groups of shapes that the noise is estimated beside, at most.
@@ -108,9 +113,29 @@ pub(crate) fn prior(ready: &Ready<'_>) -> Noise {
         Some(counts) if !speeds => {
             core::f64::consts::TAU * vehicle.driven_radius() / counts / 12.0_f64.sqrt() + 2e-5
         }
-        _ => 0.004 * vehicle.limits.speed,
+        _ => by_speeds(ready, rows[0]),
     };
     Noise::prior(vehicle, rows, resolution, false)
+}
+
+/// White noise of a bin's mean speed \[m/s\]: what is usual, unless the rows themselves say that it is quite another.
+fn by_speeds(ready: &Ready<'_>, rows: f64) -> f64 {
+    let usual = 0.004 * ready.vehicle.limits.speed;
+    let mut seen: Vec<f64> = ready
+        .runs
+        .iter()
+        .filter(|run| matches!(run.run.wheels, Wheels::Speed(_)))
+        .flat_map(|run| (0..4).filter_map(|wheel| white(run.run.wheels.series(), wheel)))
+        .collect();
+    seen.sort_by(f64::total_cmp);
+    let Some(seen) = seen.get(seen.len() / 2).map(|one| one / rows.max(1.0).sqrt()) else {
+        return usual;
+    };
+    if (usual / CONTRADICTS..usual * CONTRADICTS).contains(&seen) {
+        usual
+    } else {
+        seen.max(LEAST * ready.vehicle.limits.speed)
+    }
 }
 
 /// Columns beside which the noise is estimated: the effects of a fit, and the likeliest shapes one after the other, so
@@ -137,6 +162,30 @@ fn beside(bench: &Bench<'_>, all: &[Candidate], fit: &Fit) -> Vec<Vec<Vec<Channe
     columns
 }
 
+/// Whether a shape explains little but one block of a recording: that is an event, and nothing that the vehicle does.
+fn rests_on_one(
+    bench: &Bench<'_>,
+    search: &Search<'_>,
+    fit: &Fit,
+    (whole, slopes): (&Whole, &[Whole]),
+    group: &Shapes,
+) -> bool {
+    let all = bench.all();
+    let evidence = |runs: &[usize]| {
+        search
+            .projection(&fit.set, runs)
+            .and_then(|projection| rivals::judge(bench, &projection, whole, slopes, group))
+            .map_or(f64::NEG_INFINITY, |found| found.log_evidence)
+    };
+    if evidence(&all) <= WORTH || all.len() < 3 {
+        return false;
+    }
+    all.iter().any(|run| {
+        let others: Vec<usize> = all.iter().copied().filter(|other| other != run).collect();
+        evidence(&others) <= WORTH
+    })
+}
+
 /// Shapes beside a fit, likeliest first.
 pub(crate) fn ranked(
     bench: &Bench<'_>,
@@ -151,6 +200,9 @@ pub(crate) fn ranked(
         .par_iter()
         .filter_map(|group| {
             let found = rivals::judge(bench, &projection, &whole, &slopes, group)?;
+            if bench.is_cut() && rests_on_one(bench, search, fit, (&whole, &slopes), group) {
+                return None;
+            }
             Some(Beside {
                 entry: group.entry,
                 axis: group.axis,

@@ -10,16 +10,17 @@ use crate::bench::Bench;
 use crate::bins::to_f64;
 use crate::candidate::Coordinate;
 use crate::case::{Case, Run, Series, Wheels};
-use crate::decide::SET;
+use crate::decide::{SET, temper};
 use crate::diagnose::{Found, Settings};
 use crate::fit::{Fit, Search};
+use crate::folds::{Linearised, jackknife};
 use crate::prepare::Ready;
 use crate::verdict::{Alternative, FoundEffect, FoundParameter, Interval, Next};
 
 const WHEELS: [&str; 4] = ["fl", "fr", "rl", "rr"];
 /// Half a 90 % interval in standard deviations.
 const HALF: f64 = 1.645;
-/// What intervals are widened by, as evidences are tempered.
+/// What a cost is divided by for the posterior along a staircase, square root: evidences are tempered.
 const WIDER: f64 = 1.41;
 
 /// The effects of the likeliest set.
@@ -27,13 +28,18 @@ pub(crate) fn effects(found: &Found<'_>, search: &Search<'_>) -> Vec<FoundEffect
     let Some(best) = found.decision.sets.first() else { return Vec::new() };
     let fit = &found.analysis.fits[best.fit];
     let covariance = covariance(fit);
+    let wider = temper(found.analysis).sqrt();
+    // What differs from drive to drive is not in the covariance.
+    let scatter = Linearised::new(search, fit).and_then(|own| jackknife(search, fit, &own));
     let mut effects = Vec::new();
     let mut row = 0;
     for (member, (candidate, at)) in fit.set.iter().zip(&fit.at).enumerate() {
         let own = &search.candidates[*candidate];
         let spread: Vec<f64> = (0..at.len())
             .map(|c| {
-                WIDER * HALF * covariance[(row + c, row + c)].sqrt() * own.coordinates[c].deviation
+                let model = wider * covariance[(row + c, row + c)].sqrt();
+                let error = scatter.as_ref().map_or(model, |scatter| model.max(scatter[row + c]));
+                HALF * error * own.coordinates[c].deviation
             })
             .collect();
         row += at.len();

@@ -4,7 +4,7 @@ use kerbside_simulation::Effects;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::bins::{CHANNELS, Channels, GYRO};
+use crate::bins::{CHANNELS, Channels, GYRO, to_f64};
 use crate::generic::Extent;
 use crate::linear::{Design, Projection};
 use crate::noise::{Coefficients, Evidence, Noise, Whitener};
@@ -176,6 +176,29 @@ impl<'a> Bench<'a> {
     /// Whether every run lacks commands: motor and rack are what was measured of them.
     pub(crate) fn only_follows(&self) -> bool {
         self.ready.runs.iter().all(|run| !run.run.has_commands())
+    }
+
+    /// As how many runs the pieces count: those of one drive share more than those of several.
+    pub(crate) fn independent(&self) -> f64 {
+        let drives = to_f64(self.groups().len());
+        drives + 0.5 * (to_f64(self.raw.len()) - drives)
+    }
+
+    /// Whether some runs are pieces of one recorded drive.
+    pub(crate) fn is_cut(&self) -> bool {
+        self.groups().len() < self.raw.len()
+    }
+
+    /// The runs of each recorded drive.
+    pub(crate) fn groups(&self) -> Vec<Vec<usize>> {
+        let mut groups: Vec<(usize, Vec<usize>)> = Vec::new();
+        for (run, drive) in self.ready.drives.iter().enumerate() {
+            match groups.iter_mut().find(|(own, _)| own == drive) {
+                Some((_, runs)) => runs.push(run),
+                None => groups.push((*drive, vec![run])),
+            }
+        }
+        groups.into_iter().map(|(_, runs)| runs).collect()
     }
 
     /// Number of whitened values in all.

@@ -54,6 +54,8 @@ pub(crate) struct Decision {
     pub shape: Option<Beside>,
     /// Links of what is not listed, by their share in it.
     pub unknown_links: Vec<(Link, f64)>,
+    /// Why the likeliest listed effects are not the answer, in words; none where they may be.
+    pub doubt: Option<String>,
 }
 
 /// Decides.
@@ -116,19 +118,20 @@ pub(crate) fn decide(found: &Analysis<'_>) -> Decision {
             .into_iter()
             .map(|(link, sum)| (link, sum / unknown.max(1e-300)))
             .collect(),
+        doubt: None,
     };
     answer(&mut decision);
     decision
 }
 
 /// By what evidences are divided: few runs tell chance from cause less surely than their many values seem to.
-fn temper(found: &Analysis<'_>) -> f64 {
-    let runs = to_f64(found.bench.all().len().max(1));
+pub(crate) fn temper(found: &Analysis<'_>) -> f64 {
+    let runs = found.bench.independent().max(1.0);
     TEMPER * (ENOUGH / runs).clamp(1.0, ENOUGH)
 }
 
 /// The answer that the probabilities give.
-fn answer(decision: &mut Decision) {
+pub(crate) fn answer(decision: &mut Decision) {
     let listed: f64 = decision.sets.iter().map(|w| w.probability).sum();
     if decision.none >= listed && decision.none >= decision.unknown {
         decision.verdict = Verdict::None;

@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use crate::analyse::{Analysis, analyse, prior};
 use crate::answer;
+use crate::blocks;
 use crate::case::Case;
 use crate::decide::{Decision, decide};
 use crate::fit::Search;
@@ -13,11 +14,13 @@ use crate::folds::{self, Linearised};
 use crate::gauge::gauge;
 use crate::links;
 use crate::mistakes;
+use crate::moved;
 use crate::nuisance::{Nuisance, nuisances};
 use crate::pictures;
 use crate::prepare::Ready;
 use crate::shrink;
-use crate::verdict::{Diagnosis, Mistake, Rival, Verdict};
+use crate::trust;
+use crate::verdict::{Diagnosis, FoundEffect, Mistake, Rival, Verdict};
 use crate::words;
 
 /// A manoeuvre that could be driven next.
@@ -65,21 +68,33 @@ pub fn diagnose(
         return Err(DiagnosisError::NoRun);
     }
     progress("looking for mistakes", 0.0);
+    let recorded = case;
+    let blocks::Cut { case, drives, notices } = &blocks::cut(case);
+    if case.runs.is_empty() {
+        let why = notices.join("; ");
+        return Err(DiagnosisError::Nothing(why));
+    }
     let differ = nuisances(case);
-    let mistake = mistakes::find(case, &differ, prior);
-    let ready = Ready::new(case);
+    let mistake = mistakes::find(&blocks::excerpt(case), &differ, prior);
+    let mut ready = Ready::new(case);
+    ready.drives.clone_from(drives);
     let found = analyse(&ready, &differ, progress).ok_or_else(|| {
         DiagnosisError::Nothing("no sensor shows anything that commands could explain".to_owned())
     })?;
     progress("how far the gap shrinks", 0.88);
-    let decision = decide(&found);
-    Ok(told(
+    let mut decision = decide(&found);
+    let search = Search { bench: &found.bench, candidates: &found.candidates };
+    trust::distrust(&found, &search, &mut decision);
+    let mut told = told(
         case,
         &Found { analysis: &found, decision: &decision, nuisances: &differ },
         settings,
         mistake,
         progress,
-    ))
+    );
+    told.notices = words::notices(recorded);
+    told.notices.extend(notices.iter().cloned());
+    Ok(told)
 }
 
 /// What was found, in one place.
@@ -110,19 +125,7 @@ fn told(
         .map(|run| analysis.bench.raw_of(*run, &Effects::NEUTRAL))
         .collect();
     let chain = links::chain(&analysis.bench, &analysis.noise, &neutral);
-    let links_named = match verdict {
-        Verdict::Mistake => mistake.iter().map(|mistake| mistake.link).collect(),
-        Verdict::None => Vec::new(),
-        Verdict::Unknown => {
-            decision.unknown_links.first().map(|(link, _)| *link).into_iter().collect()
-        }
-        Verdict::Effects | Verdict::Ambiguous => {
-            let mut links: Vec<Link> = effects.iter().map(|effect| effect.link).collect();
-            links.sort_unstable();
-            links.dedup();
-            links
-        }
-    };
+    let links_named = links_named(verdict, mistake.as_ref(), decision, &effects);
     let rivals: Vec<usize> = decision.sets.iter().take(RIVALS).map(|weighed| weighed.fit).collect();
     let gap = shrink::shrinkage(found, &search, &rivals, by_hand.as_ref(), named);
     progress("what to drive next", 0.94);
@@ -133,6 +136,7 @@ fn told(
         verdict,
         sentence: String::new(),
         links_named,
+        moved: moved::moved(&search, &analysis.beside_nothing).iter().map(|(l, _)| *l).collect(),
         alternatives: answer::alternatives(found),
         effects,
         ranking: ranking(found, &search, &rivals),
@@ -150,7 +154,7 @@ fn told(
         paths: pictures::paths(found, after.as_ref()),
         plot: pictures::plot(found, after.as_ref()),
         horizons: pictures::horizons(found, after.as_ref()),
-        notices: words::notices(case),
+        notices: Vec::new(),
         duration: case.runs.iter().map(|run| run.span()).map(|(begin, end)| end - begin).sum(),
     };
     if verdict == Verdict::Mistake {
@@ -158,6 +162,28 @@ fn told(
     }
     diagnosis.sentence = words::sentence(&diagnosis, decision);
     diagnosis
+}
+
+/// Links of the answer, in the order of cause.
+fn links_named(
+    verdict: Verdict,
+    mistake: Option<&Mistake>,
+    decision: &Decision,
+    effects: &[FoundEffect],
+) -> Vec<Link> {
+    match verdict {
+        Verdict::Mistake => mistake.into_iter().map(|mistake| mistake.link).collect(),
+        Verdict::None => Vec::new(),
+        Verdict::Unknown => {
+            decision.unknown_links.first().map(|(link, _)| *link).into_iter().collect()
+        }
+        Verdict::Effects | Verdict::Ambiguous => {
+            let mut links: Vec<Link> = effects.iter().map(|effect| effect.link).collect();
+            links.sort_unstable();
+            links.dedup();
+            links
+        }
+    }
 }
 
 /// Every rival worth showing, likeliest first.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::analyse::Analysis;
 use crate::bench::Whole;
-use crate::bins::Channels;
+use crate::bins::{Channels, to_f64};
 use crate::fit::{Fit, Search};
 use crate::linear::Projection;
 
@@ -77,6 +77,33 @@ pub(crate) fn left_out(
             }
         })
         .collect()
+}
+
+/// Drives that are asked for before blocks of one count as one.
+const DRIVES: usize = 4;
+
+/// How far a fit's coordinates move as parts of the runs are left out in turn: their standard errors in units of the
+/// priors (the jackknife of Quenouille and Tukey), which hold whatever differs from drive to drive; of blocks where
+/// there are few drives. None where there are too few of either.
+pub(crate) fn jackknife(search: &Search<'_>, fit: &Fit, own: &Linearised) -> Option<DVector<f64>> {
+    let all = search.bench.all();
+    let drives = search.bench.groups();
+    let parts =
+        if drives.len() < DRIVES { all.iter().map(|run| vec![*run]).collect() } else { drives };
+    if parts.len() < DRIVES {
+        return None;
+    }
+    let without = |part: &Vec<usize>| {
+        let others: Vec<usize> = all.iter().copied().filter(|run| !part.contains(run)).collect();
+        Some(own.over(search, &search.projection(&fit.set, &others)?)?.step)
+    };
+    let steps: Vec<DVector<f64>> = parts.par_iter().map(without).collect::<Option<_>>()?;
+    let count = to_f64(steps.len());
+    let mut mean = DVector::zeros(own.slopes.len());
+    steps.iter().for_each(|step| mean += step / count);
+    let mut square = DVector::zeros(own.slopes.len());
+    steps.iter().for_each(|step| square += (step - &mean).map(|d| d * d));
+    Some(square.map(|sum| (sum * (count - 1.0) / count).sqrt()))
 }
 
 /// The effects that the other runs choose and fit for each run: none where they choose nothing.

@@ -8,7 +8,9 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::bench::Bench;
 use crate::bins::{self, Channels, to_f64};
-use crate::noise::{Noise, draw};
+use crate::floor::drawn;
+use crate::follow::Turn;
+use crate::noise::Noise;
 use crate::path::driven_share;
 use crate::verdict::LinkGap;
 
@@ -239,9 +241,8 @@ fn subtract(rows: &mut [Channels], response: &[Channels]) {
 fn floors(bench: &Bench<'_>, noise: &Noise, run: usize) -> Vec<(f64, usize)> {
     let mut random = Pcg64Mcg::seed_from_u64(17 + run as u64);
     let mut sums = vec![(0.0, 0); Signal::ALL.len()];
-    let noise = Noise { follows: !bench.ready.runs[run].run.has_commands(), ..*noise };
     for _ in 0..DRAWS {
-        let drawn = draw(&bench.coefficients[run], &noise, &mut random);
+        let drawn = drawn(bench, noise, run, &mut random);
         for (sum, windows) in sums.iter_mut().zip(windows(bench, run, &drawn)) {
             sum.0 += windows.iter().map(|(_, value)| value * value).sum::<f64>();
             sum.1 += windows.len();
@@ -263,15 +264,15 @@ pub(crate) fn chain(bench: &Bench<'_>, noise: &Noise, residuals: &[Vec<Channels>
             bench.raw_columns(*run).iter().map(|column| windows(bench, *run, column)).collect()
         })
         .collect();
+    let repeats = repeats(bench);
     let gaps: Vec<(Signal, LinkGap)> = Signal::ALL
         .into_iter()
         .enumerate()
-        .filter(|(_, signal)| {
-            !(bench.only_follows() && matches!(signal, Signal::DrivenTravel | Signal::Steering))
-        })
+        .filter(|(_, signal)| !is_input(bench, *signal))
         .filter_map(|(i, signal)| {
             let own: Vec<&Windows> = measured.iter().map(|run| &run[i]).collect();
             let floor = pooled(floors.iter().map(|run| run[i]));
+            let floor = with_repeats(floor, &repeats, |run| &measured[run][i]);
             let allowance: f64 = (0..bench.raw_columns(0).len())
                 .map(|column| {
                     let square = |w: &Windows| (w.iter().map(|(_, v)| v * v).sum::<f64>(), w.len());
@@ -284,6 +285,69 @@ pub(crate) fn chain(bench: &Bench<'_>, noise: &Noise, residuals: &[Vec<Channels>
         })
         .collect();
     Link::ALL.into_iter().map(|link| worst(link, &gaps)).collect()
+}
+
+/// Whether a signal is what the model was driven by in every run.
+fn is_input(bench: &Bench<'_>, signal: Signal) -> bool {
+    bench.all().iter().all(|run| {
+        matches!(
+            (bench.ready.followed_turn(*run), signal),
+            (Some(_), Signal::DrivenTravel | Signal::Steering)
+                | (Some(Turn::Wheels), Signal::WheelYaw)
+                | (Some(Turn::Gyro), Signal::GyroYaw)
+                | (Some(Turn::Reference), Signal::ReferenceYaw)
+        )
+    })
+}
+
+/// Windows that do not overlap, as many as which the modelled floor counts.
+const MODELLED: f64 = 24.0;
+
+/// Runs that repeat another one, and by how many bins it came earlier.
+fn repeats(bench: &Bench<'_>) -> Vec<(usize, usize, isize)> {
+    let runs = &bench.ready.runs;
+    let begins = |run: usize| {
+        let first = runs[run].run.commands.iter().find(|command| command.speed != 0.0);
+        first.map_or(0.0, |command| command.t)
+    };
+    let mut pairs = Vec::new();
+    for (run, prepared) in runs.iter().enumerate() {
+        let Some(name) = &prepared.run.repeat_of else { continue };
+        let other = runs.iter().position(|other| other.run.name == *name);
+        if let Some(other) = other.filter(|other| *other != run) {
+            let bins = (begins(run) - begins(other)) / prepared.binned.width;
+            #[allow(clippy::cast_possible_truncation)] // Few.
+            pairs.push((run, other, bins.round() as isize));
+        }
+    }
+    pairs
+}
+
+/// A floor with what runs that repeat each other differ by: half their mean squared difference, in which all that
+/// repeats cancels.
+fn with_repeats<'w>(
+    modelled: f64,
+    pairs: &[(usize, usize, isize)],
+    windows: impl Fn(usize) -> &'w Windows,
+) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (run, other, bins) in pairs {
+        let theirs = windows(*other);
+        for (from, value) in windows(*run) {
+            let from = from.checked_add_signed(-bins);
+            let same = from.and_then(|from| theirs.binary_search_by_key(&from, |w| w.0).ok());
+            if let Some(same) = same {
+                sum += 0.5 * (value - theirs[same].1).powi(2);
+                count += 1.0;
+            }
+        }
+    }
+    if count == 0.0 {
+        return modelled;
+    }
+    // Windows overlap.
+    let independent = count * bins::WIDTH / HORIZON;
+    (MODELLED * modelled + independent * sum / count) / (MODELLED + independent)
 }
 
 fn pooled(parts: impl Iterator<Item = (f64, usize)>) -> f64 {

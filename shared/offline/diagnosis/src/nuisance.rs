@@ -35,11 +35,9 @@ const ROUNDED: f64 = 0.002;
 /// The nuisances of a case.
 pub(crate) fn nuisances(case: &Case) -> Vec<Nuisance> {
     let vehicle = &case.vehicle;
-    let mut all: Vec<Nuisance> = match &case.allowance {
-        Some(allowance) => stated(allowance, vehicle),
-        None => ordinary(vehicle),
-    };
-    for own in inherent(case) {
+    let mut all: Vec<Nuisance> =
+        case.allowance.as_ref().map(|allowance| stated(allowance, vehicle)).unwrap_or_default();
+    for own in ordinary(vehicle).into_iter().chain(inherent(case)) {
         // What vehicle.toml states goes before.
         if all.iter().all(|nuisance| nuisance.parameter != own.parameter) {
             all.push(own);
@@ -47,6 +45,15 @@ pub(crate) fn nuisances(case: &Case) -> Vec<Nuisance> {
     }
     all.retain(|nuisance| nuisance.deviation > 0.0 && nuisance.deviation.is_finite());
     all
+}
+
+/// Whether vehicle.toml states an allowance of some things, but not of all that are measured by tape.
+pub(crate) fn is_partly_stated(case: &Case) -> bool {
+    let Some(allowance) = &case.allowance else { return false };
+    let stated = stated(allowance, &case.vehicle);
+    ordinary(&case.vehicle)
+        .iter()
+        .any(|own| stated.iter().all(|nuisance| nuisance.parameter != own.parameter))
 }
 
 /// What every car has and nobody states: tyres that creep in proportion to their force over their load, a linkage that

@@ -2,9 +2,12 @@
 
 use kerbside_geometry::math;
 use kerbside_simulation::Effects;
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
 
-use crate::bins::{Channels, GYRO, REFERENCE, STEERING};
+use crate::bins::{CHANNELS, Channels, GYRO, REFERENCE, STEERING};
 use crate::diagnose::Found;
+use crate::floor::{drawn, in_frame};
 use crate::folds::errors;
 use crate::generic::{Axis, Entry, shapes};
 use crate::links;
@@ -125,34 +128,58 @@ pub(crate) fn plot(found: &Found<'_>, after: Option<&Effects>) -> Option<RegimeP
 /// Growth of the position error with the horizon: nominal, with the effects, and floor.
 pub(crate) fn horizons(found: &Found<'_>, after: Option<&Effects>) -> Vec<(f64, f64, f64, f64)> {
     let bench = &found.analysis.bench;
+    let of = |run: usize, effects: &Effects| {
+        (bench.ready.runs[run].binned.measured.clone(), bench.ready.predicted(run, effects))
+    };
+    let nominal: Vec<_> = bench.all().iter().map(|run| of(*run, &Effects::NEUTRAL)).collect();
+    let with: Option<Vec<_>> =
+        after.map(|effects| bench.all().iter().map(|run| of(*run, effects)).collect());
+    let noise: Vec<_> = bench.all().iter().map(|run| noise_alone(found, *run)).collect();
+    let width = bench.ready.runs.first().map_or(crate::bins::WIDTH, |run| run.binned.width);
     let mut rows = Vec::new();
     for horizon in [0.5, 1.0, 2.0, 4.0, 8.0, 16.0] {
-        let mut sums = [(0.0, 0.0); 2];
-        for run in bench.all() {
-            let binned = &bench.ready.runs[run].binned;
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-            let span = (horizon / binned.width).round() as usize;
-            for (sum, effects) in sums.iter_mut().zip([Some(&Effects::NEUTRAL), after]) {
-                let Some(effects) = effects else { continue };
-                let predicted = bench.ready.predicted(run, effects);
-                let mut from = 0;
-                while from + span < binned.measured.len() {
-                    let range = from..=from + span;
-                    let grown =
-                        errors(binned.width, &binned.measured[range.clone()], &predicted[range]);
-                    if let Some(last) = grown.last() {
-                        sum.0 += last.1 * last.1;
-                        sum.1 += 1.0;
-                    }
-                    from += span.div_ceil(2).max(1);
-                }
-            }
-        }
-        let rms =
-            |(sum, count): (f64, f64)| if count > 0.0 { (sum / count).sqrt() } else { f64::NAN };
-        if sums[0].1 > 0.0 {
-            rows.push((horizon, rms(sums[0]), rms(sums[1]), f64::NAN));
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let span = (horizon / width).round() as usize;
+        let before = grown(&nominal, width, span);
+        if before.is_finite() {
+            let less = with.as_ref().map_or(f64::NAN, |with| grown(with, width, span));
+            rows.push((horizon, before, less, grown(&noise, width, span)));
         }
     }
     rows
+}
+
+/// A run as it would be measured if the model were right, and as it is predicted.
+fn noise_alone(found: &Found<'_>, run: usize) -> (Vec<Channels>, Vec<Channels>) {
+    let bench = &found.analysis.bench;
+    let mut random = Pcg64Mcg::seed_from_u64(43 + run as u64);
+    let drawn = drawn(bench, &found.analysis.noise, run, &mut random);
+    let path = &bench.paths[run];
+    let zero = vec![[0.0; CHANNELS]; path.pose.len()];
+    let mut noisy = in_frame(path, &drawn);
+    for (row, measured) in noisy.iter_mut().zip(&bench.ready.runs[run].binned.measured) {
+        for (value, measured) in row.iter_mut().zip(measured) {
+            if !measured.is_finite() {
+                *value = f64::NAN;
+            }
+        }
+    }
+    (noisy, in_frame(path, &zero))
+}
+
+/// Root mean square of the position error after `span` bins, over windows that overlap by half.
+fn grown(runs: &[(Vec<Channels>, Vec<Channels>)], width: f64, span: usize) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (measured, predicted) in runs {
+        let mut from = 0;
+        while from + span < measured.len() {
+            let range = from..=from + span;
+            if let Some(last) = errors(width, &measured[range.clone()], &predicted[range]).last() {
+                sum += last.1 * last.1;
+                count += 1.0;
+            }
+            from += span.div_ceil(2).max(1);
+        }
+    }
+    if count > 0.0 { (sum / count).sqrt() } else { f64::NAN }
 }

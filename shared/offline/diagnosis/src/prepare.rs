@@ -1,14 +1,19 @@
 //! A case made ready: bins, start poses, and the model's answer to any set of effects.
 
 use kerbside_geometry::{Pose, Vehicle, math};
-use kerbside_simulation::{Drive, Effects, Follow, Sample, Trajectory};
+use kerbside_simulation::{Command, Drive, Effects, Follow, InMotion, Trajectory};
 
 use crate::bins::{Binned, Channels, Shown, WIDTH, to_f64};
 use crate::case::{Case, Run, Wheels};
-use crate::path::{Path, Place, driven_share};
+use crate::follow::{Followed, Turn, follow};
+use crate::path::{Path, Place};
 
 /// Step of the simulation \[s\].
 const STEP: f64 = 0.04;
+/// Share of the measured motion's size by which commands may lead elsewhere.
+const ASTRAY: f64 = 0.35;
+/// Commands older than this act already \[s\].
+const EARLIER: f64 = 1.0;
 /// Travel below which a car has not moved, in wheel radii.
 const STANDING: f64 = 0.05;
 
@@ -19,8 +24,14 @@ pub(crate) struct Prepared<'a> {
     pub binned: Binned,
     /// Pose of the body at t = 0.
     pub start: Pose,
-    /// What was measured of motor and rack, where no commands were recorded.
-    follow: Option<Followed>,
+    /// What was measured of motor and rack.
+    measured: Followed,
+    /// How it moved at t = 0.
+    motion: InMotion,
+    /// The commands, from before t = 0 on where it was under way; none where none were recorded.
+    commands: Option<Vec<Command>>,
+    /// Whether commands lead so far from what was measured that errors are linear about the measured path alone.
+    astray: bool,
 }
 
 /// A case made ready.
@@ -28,6 +39,8 @@ pub(crate) struct Prepared<'a> {
 pub(crate) struct Ready<'a> {
     pub vehicle: &'a Vehicle,
     pub runs: Vec<Prepared<'a>>,
+    /// Of which recorded drive each run is a piece.
+    pub drives: Vec<usize>,
 }
 
 impl<'a> Ready<'a> {
@@ -36,11 +49,56 @@ impl<'a> Ready<'a> {
         let vehicle = &case.vehicle;
         let marker = vehicle.reference.map_or(Pose::default(), |reference| reference.marker);
         let prepared = |run: &'a Run| {
-            let follow = (!run.has_commands()).then(|| follow(run, vehicle));
+            let measured = follow(run, vehicle);
+            let motion = measured.motion(vehicle);
             let binned = Binned::new(run, WIDTH, vehicle.radius, marker);
-            Prepared { run, start: start(run, vehicle, &marker), binned, follow }
+            let start = start(run, vehicle, &marker, &motion);
+            let commands = run.has_commands().then(|| under_way(run, &motion));
+            Prepared { run, start, binned, measured, motion, commands, astray: false }
         };
-        Self { vehicle, runs: case.runs.iter().map(prepared).collect() }
+        let runs: Vec<Prepared<'a>> = case.runs.iter().map(prepared).collect();
+        let mut ready = Self { vehicle, drives: (0..runs.len()).collect(), runs };
+        for run in 0..ready.runs.len() {
+            ready.runs[run].astray = ready.leads_astray(run);
+        }
+        ready
+    }
+
+    /// Whether commands lead far from what was measured.
+    fn leads_astray(&self, run: usize) -> bool {
+        let prepared = &self.runs[run];
+        if prepared.commands.is_none() || prepared.measured.turn == Turn::Nothing {
+            return false;
+        }
+        let by_commands = self.trajectory(run, &Effects::NEUTRAL);
+        let as_measured = self.as_measured(run);
+        let (mut off, mut all) = ((0.0, 0.0), (1e-12, 1e-12));
+        for bin in 0..prepared.binned.len() {
+            let t = prepared.binned.time(bin);
+            let (c, m) = (by_commands.state(t), as_measured.state(t));
+            off.0 += (c.motor_speed - m.motor_speed).powi(2);
+            off.1 += (c.yaw_rate - m.yaw_rate).powi(2);
+            all.0 += m.motor_speed * m.motor_speed;
+            all.1 += m.yaw_rate * m.yaw_rate;
+        }
+        let far = ASTRAY * ASTRAY;
+        off.0 > far * all.0 || off.1 > 4.0 * far * all.1 && off.1 > 0.01 * all.0
+    }
+
+    /// What told the turn of a run that follows what was measured; none of one that follows commands.
+    pub(crate) fn followed_turn(&self, run: usize) -> Option<Turn> {
+        let prepared = &self.runs[run];
+        prepared.commands.is_none().then_some(prepared.measured.turn)
+    }
+
+    fn as_measured(&self, run: usize) -> Trajectory {
+        let prepared = &self.runs[run];
+        let mut trajectory = Trajectory::default();
+        let (vehicle, start) = (self.vehicle, prepared.start);
+        let Followed { speeds, racks, .. } = &prepared.measured;
+        Follow { vehicle, effects: Effects::NEUTRAL, speeds, racks, start, step: STEP }
+            .trajectory(prepared.binned.end() + 0.1, &mut trajectory);
+        trajectory
     }
 
     /// Lets every run have been measured as `effects` would show it, without noise.
@@ -56,13 +114,16 @@ impl<'a> Ready<'a> {
         let mut trajectory = Trajectory::default();
         let until = prepared.binned.end() + 0.1;
         let (vehicle, start) = (self.vehicle, prepared.start);
-        match &prepared.follow {
-            None => {
-                let commands = &prepared.run.commands;
-                Drive { vehicle, effects: *effects, commands, start, step: STEP }
-                    .trajectory(until, &mut trajectory);
+        match &prepared.commands {
+            Some(commands) => {
+                Drive { vehicle, effects: *effects, commands, start, step: STEP }.trajectory_from(
+                    &prepared.motion,
+                    until,
+                    &mut trajectory,
+                );
             }
-            Some(Followed { speeds, racks }) => {
+            None => {
+                let Followed { speeds, racks, .. } = &prepared.measured;
                 Follow { vehicle, effects: *effects, speeds, racks, start, step: STEP }
                     .trajectory(until, &mut trajectory);
             }
@@ -78,8 +139,9 @@ impl<'a> Ready<'a> {
 
     /// The path of a run about which errors are linear.
     pub(crate) fn path(&self, run: usize, effects: &Effects) -> Path {
-        let trajectory = self.trajectory(run, effects);
         let prepared = &self.runs[run];
+        let trajectory =
+            if prepared.astray { self.as_measured(run) } else { self.trajectory(run, effects) };
         let place = |bin: usize| {
             let state = trajectory.state(prepared.binned.time(bin));
             Place { pose: state.pose, steering: state.rack }
@@ -121,13 +183,19 @@ impl Shown for Simulated<'_> {
 
 /// Where the body was at t = 0: as run.toml says, or as the reference showed while the car stood; without a yaw in the
 /// reference it headed where it went first.
-fn start(run: &Run, vehicle: &Vehicle, marker: &Pose) -> Pose {
+fn start(run: &Run, vehicle: &Vehicle, marker: &Pose, motion: &InMotion) -> Pose {
     if let Some(start) = run.start {
         return start;
     }
     let stood = stood_until(run, vehicle);
     let rows = run.reference.between(f64::NEG_INFINITY, stood);
-    let rows = if rows.is_empty() { first_rows(run) } else { rows };
+    let rows = if motion.speed != 0.0 {
+        at_once(run, motion)
+    } else if rows.is_empty() {
+        first_rows(run)
+    } else {
+        rows
+    };
     let mean = |column: usize| {
         let values: Vec<f64> =
             rows.value.iter().map(|row| row[column]).filter(|v| v.is_finite()).collect();
@@ -144,6 +212,30 @@ fn start(run: &Run, vehicle: &Vehicle, marker: &Pose) -> Pose {
     let heading = first_heading(run, vehicle, (x, y));
     let (sin, cos) = math::sin_cos(heading);
     Pose::new(x - cos * marker.x + sin * marker.y, y - sin * marker.x - cos * marker.y, heading)
+}
+
+/// The first row of a car that is under way, brought back to t = 0.
+fn at_once(run: &Run, motion: &InMotion) -> crate::case::Series<3> {
+    let mut rows = first_rows(run);
+    rows.t.truncate(1);
+    rows.value.truncate(1);
+    for (t, row) in rows.t.iter().zip(&mut rows.value) {
+        let (sin, cos) = if row[2].is_finite() { math::sin_cos(row[2]) } else { (0.0, 0.0) };
+        row[0] -= t * motion.speed * cos;
+        row[1] -= t * motion.speed * sin;
+    }
+    rows
+}
+
+/// Commands of a run; one that is under way at t = 0 held its motion until the first of them acts.
+fn under_way(run: &Run, motion: &InMotion) -> Vec<Command> {
+    let mut commands = run.commands.clone();
+    let moves = motion.speed != 0.0;
+    if let Some(first) = commands.first().filter(|first| moves && first.t > -EARLIER) {
+        let t = first.t - EARLIER;
+        commands.insert(0, Command { t, speed: motion.speed, steering: motion.rack });
+    }
+    commands
 }
 
 fn first_rows(run: &Run) -> crate::case::Series<3> {
@@ -191,100 +283,4 @@ fn first_heading(run: &Run, vehicle: &Vehicle, begin: (f64, f64)) -> f64 {
         Wheels::Speed(_) => series.value[at].iter().filter(|v| v.is_finite()).sum(),
     };
     if ahead < 0.0 { direction + core::f64::consts::PI } else { direction }
-}
-
-/// Motor and rack as measured.
-#[derive(Debug)]
-struct Followed {
-    speeds: Vec<Sample>,
-    racks: Vec<Sample>,
-}
-
-/// The driven wheels that were read (or all that were) and the steering sensor; without one the rack stands straight.
-fn follow(run: &Run, vehicle: &Vehicle) -> Followed {
-    let series = run.wheels.series();
-    let share = driven_share(vehicle);
-    let read = |wheel: usize| series.has(wheel);
-    let driven: Vec<usize> = (0..4).filter(|wheel| share[*wheel] > 0.0 && read(*wheel)).collect();
-    let used =
-        if driven.is_empty() { (0..4).filter(|wheel| read(*wheel)).collect() } else { driven };
-    let (count, radius) = (to_f64(used.len()), vehicle.driven_radius());
-    let mut speeds = Vec::with_capacity(series.t.len());
-    let mut last: Option<(f64, f64)> = None;
-    for (t, value) in series.t.iter().zip(&series.value) {
-        if used.iter().any(|wheel| !value[*wheel].is_finite()) {
-            continue;
-        }
-        if matches!(run.wheels, Wheels::Speed(_)) {
-            let turn: f64 = used.iter().map(|wheel| value[*wheel] / vehicle.radius[*wheel]).sum();
-            speeds.push(Sample { t: *t, value: radius * turn / count });
-            continue;
-        }
-        let turned: f64 = used.iter().map(|wheel| value[*wheel]).sum();
-        if let Some((before, from)) = last {
-            speeds.push(Sample {
-                t: 0.5 * (t + before),
-                value: radius * (turned - from) / count / (t - before),
-            });
-        }
-        last = Some((*t, turned));
-    }
-    let angle =
-        |reading: f64| vehicle.steering_sensor.map_or(reading, |sensor| sensor.angle(reading));
-    let rows =
-        run.steering.t.iter().zip(&run.steering.value).filter(|(_, value)| value[0].is_finite());
-    let racks: Vec<Sample> =
-        rows.map(|(t, value)| Sample { t: *t, value: angle(value[0]) }).collect();
-    let racks = if racks.is_empty() { turning(run, vehicle) } else { racks };
-    Followed { speeds, racks }
-}
-
-/// Time over which two wheels' ways are compared \[s\].
-const COMPARED: f64 = 0.2;
-/// Largest angle that two wheels' ways are taken for \[rad\].
-const LARGEST: f64 = 1.35;
-
-/// Without a steering sensor: the angle at which the two wheels of the rear axle would roll as far as they did; of the
-/// front one where the rear one was not read (at small angles the same). Straight where no axle was read on both sides.
-fn turning(run: &Run, vehicle: &Vehicle) -> Vec<Sample> {
-    let series = run.wheels.series();
-    let axles = [([2, 3], vehicle.track_rear), ([0, 1], vehicle.track_front)];
-    let read = |wheels: &[usize; 2]| wheels.iter().all(|wheel| series.has(*wheel));
-    let Some(([left, right], track)) =
-        axles.iter().find(|(wheels, track)| *track > 0.0 && read(wheels))
-    else {
-        return Vec::new();
-    };
-    let reports = matches!(run.wheels, Wheels::Speed(_));
-    let way = |row: &[f64; 4], wheel: usize| {
-        row[wheel] * if reports { 1.0 } else { vehicle.radius[wheel] }
-    };
-    let mut racks = Vec::new();
-    let mut from: Option<(f64, [f64; 2])> = None;
-    for (t, row) in series.t.iter().zip(&series.value) {
-        let ways = [way(row, *left), way(row, *right)];
-        if ways.iter().any(|way| !way.is_finite()) {
-            continue;
-        }
-        let (at, [l, r]) = match from {
-            _ if reports => (*t, ways),
-            None => {
-                from = Some((*t, ways));
-                continue;
-            }
-            Some((before, _)) if t - before < COMPARED => continue,
-            Some((before, earlier)) => {
-                from = Some((*t, ways));
-                (0.5 * (t + before), [ways[0] - earlier[0], ways[1] - earlier[1]])
-            }
-        };
-        let mean = 0.5 * (l + r);
-        // A car that stands keeps its wheels where they were.
-        if mean.abs() > 1e-3 * vehicle.radius[*left] {
-            let value =
-                math::atan(vehicle.wheelbase * (r - l) / (track * mean)).clamp(-LARGEST, LARGEST);
-            racks.push(Sample { t: at, value });
-        }
-    }
-    racks
 }

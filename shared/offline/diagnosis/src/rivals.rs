@@ -28,12 +28,37 @@ pub(crate) fn shapes(bench: &Bench<'_>) -> Vec<Shapes> {
         .into_iter()
         .filter(shown)
         .flat_map(|entry| Axis::ALL.into_iter().map(move |axis| (entry, axis)))
+        .filter(|(_, axis)| *axis != Axis::Place || !bench.is_cut() || comes_back(bench))
         .filter(|(entry, axis)| {
             *axis != Axis::Turn || matches!(entry, Entry::Wheel(_) | Entry::Curvature | Entry::Slip)
         })
         .collect();
     pairs.par_iter().map(|(entry, axis)| of(bench, *entry, *axis)).collect()
 }
+
+/// Whether the paths of different runs meet in most of the map: a place that is passed once is a time.
+fn comes_back(bench: &Bench<'_>) -> bool {
+    let [x0, y0, x1, y1] = bench.extent.place;
+    let pitch = ((x1 - x0).max(y1 - y0) / PARTS).max(1e-9);
+    let mut seen: Vec<((i64, i64), usize)> = Vec::new();
+    for (run, path) in bench.paths.iter().enumerate() {
+        for pose in &path.pose {
+            #[allow(clippy::cast_possible_truncation)] // Few.
+            let cell = (((pose.x - x0) / pitch) as i64, ((pose.y - y0) / pitch) as i64);
+            if !seen.contains(&(cell, run)) {
+                seen.push((cell, run));
+            }
+        }
+    }
+    seen.sort_unstable();
+    let mut cells: Vec<(i64, i64)> = seen.iter().map(|(cell, _)| *cell).collect();
+    cells.dedup();
+    let passed = |cell: &(i64, i64)| seen.iter().filter(|(other, _)| other == cell).count();
+    2 * cells.iter().filter(|cell| passed(cell) > 2).count() > cells.len()
+}
+
+/// Parts of a map's longer side that count as one place.
+const PARTS: f64 = 20.0;
 
 fn of(bench: &Bench<'_>, entry: Entry, axis: Axis) -> Shapes {
     let mut raw: Vec<Vec<Vec<Channels>>> = Vec::new();

@@ -7,8 +7,9 @@ use rand_pcg::Pcg64Mcg;
 use crate::bins::{CHANNELS, Channels, REFERENCE, to_f64};
 use crate::diagnose::Found;
 use crate::fit::Search;
+use crate::floor::{drawn, in_frame};
 use crate::folds::{chosen, errors};
-use crate::noise::{Noise, draw, normal};
+use crate::noise::normal;
 use crate::verdict::{Interval, Shrinkage};
 
 /// Draws of the noise for the floor.
@@ -107,13 +108,12 @@ fn removed(before: &[Rms], after: &[Rms], floor: &[Rms]) -> Interval {
 fn floor(found: &Found<'_>, run: usize) -> Rms {
     let bench = &found.analysis.bench;
     let prepared = &bench.ready.runs[run];
-    let noise = Noise { follows: !prepared.run.has_commands(), ..found.analysis.noise };
     let mut random = Pcg64Mcg::seed_from_u64(29 + run as u64);
     let path = &bench.paths[run];
     let zero: Vec<Channels> = in_frame(path, &vec![[0.0; CHANNELS]; path.pose.len()]);
     let mut sum = Rms::default();
     for _ in 0..DRAWS {
-        let mut drawn = draw(&bench.coefficients[run], &noise, &mut random);
+        let mut drawn = drawn(bench, &found.analysis.noise, run, &mut random);
         for column in bench.raw_columns(run) {
             let size = normal(&mut random);
             for (drawn, column) in drawn.iter_mut().zip(column) {
@@ -127,20 +127,6 @@ fn floor(found: &Found<'_>, run: usize) -> Rms {
         sum.yaw += one.yaw / to_f64(DRAWS);
     }
     sum
-}
-
-/// A path with errors in its body frame, as poses in the reference frame.
-fn in_frame(path: &crate::path::Path, errors: &[Channels]) -> Vec<Channels> {
-    path.pose
-        .iter()
-        .zip(errors)
-        .map(|(pose, error)| {
-            let (x, y) = pose.transform(error[REFERENCE], error[REFERENCE + 1]);
-            let mut row = *error;
-            row[REFERENCE..].copy_from_slice(&[x, y, pose.yaw + error[REFERENCE + 2]]);
-            row
-        })
-        .collect()
 }
 
 /// The gap after each effect of the answer is added.

@@ -208,6 +208,9 @@ pub struct Diagnosis {
     pub sentence: String,
     /// Links of the answer, in the order of cause; empty for `none`.
     pub links_named: Vec<Link>,
+    /// Links whose patterns the residuals have before any effect is fitted, at most two, the likeliest first; empty
+    /// where nothing is beyond floor and allowance.
+    pub moved: Vec<Link>,
     /// The answer's effects; of an ambiguous one the likeliest alternative's.
     pub effects: Vec<FoundEffect>,
     /// The 90 % set.

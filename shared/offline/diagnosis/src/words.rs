@@ -4,6 +4,7 @@ use crate::case::Case;
 use crate::decide::Decision;
 use crate::diagnose::Found;
 use crate::generic::Axis;
+use crate::nuisance::is_partly_stated;
 use crate::verdict::{Diagnosis, FoundEffect, Verdict};
 
 /// One sentence for a tired engineer.
@@ -11,8 +12,9 @@ pub(crate) fn sentence(diagnosis: &Diagnosis, decision: &Decision) -> String {
     let percent = |p: f64| format!("{:.0} %", (100.0 * p).min(99.0));
     let removed =
         diagnosis.gap.as_ref().and_then(|gap| gap.removed).map_or(String::new(), |removed| {
+            let them = if diagnosis.effects.len() > 1 { "them" } else { "it" };
             format!(
-                "; adding it removes {:.0} % of the explainable gap on runs left out",
+                "; adding {them} removes {:.0} % of the explainable gap on runs left out",
                 100.0 * removed.value
             )
         });
@@ -24,6 +26,11 @@ pub(crate) fn sentence(diagnosis: &Diagnosis, decision: &Decision) -> String {
         Verdict::None => format!(
             "No gap beyond the noise floor and what a car in good order may have ({}).",
             percent(decision.none)
+        ),
+        Verdict::Unknown if decision.doubt.is_some() => format!(
+            "A real gap of unknown cause: what fits best does not hold up, since {} ({}).",
+            decision.doubt.as_deref().unwrap_or_default(),
+            percent(decision.unknown)
         ),
         Verdict::Unknown => {
             let shape = decision.shape.map_or(String::new(), |shape| {
@@ -86,17 +93,17 @@ pub(crate) fn regime(found: &Found<'_>, verdict: Verdict) -> String {
     };
     let Some(shape) = shape.filter(|shape| shape.log_evidence > 3.0) else { return String::new() };
     let when = match shape.axis {
-        Axis::Time => "it grows with the time since the start of the run",
-        Axis::Direction => "it differs between forwards and reverse",
-        Axis::Speed => "it grows with the speed",
-        Axis::Acceleration => "it shows while speeding up and slowing down",
-        Axis::Curvature => "it shows in curves",
-        Axis::SteeringRate => "it shows while the steering turns",
-        Axis::Heading => "it depends on the heading",
-        Axis::Place => "it belongs to places",
-        Axis::Turn => "it comes once a turn of the wheel",
+        Axis::Time => "changes with the time since the start of a run",
+        Axis::Direction => "differs between forwards and reverse",
+        Axis::Speed => "changes with the speed",
+        Axis::Acceleration => "differs between speeding up and slowing down",
+        Axis::Curvature => "changes with the curvature of the path",
+        Axis::SteeringRate => "depends on which way the steering turns",
+        Axis::Heading => "depends on the heading",
+        Axis::Place => "depends on the place",
+        Axis::Turn => "varies once a turn of the wheel",
     };
-    format!("{}: {when}", shape.entry.words())
+    format!("{} {when}", shape.entry.words())
 }
 
 /// What narrows the answer.
@@ -134,6 +141,12 @@ pub(crate) fn notices(case: &Case) -> Vec<String> {
     put(without(&|run| !run.reference.is_empty()), "reference", "the way over ground is not seen");
     if case.allowance.is_none() {
         notices.push("vehicle.toml states no [uncertainty]: the allowance of an ordinary car measured by tape is used".to_owned());
+    }
+    if is_partly_stated(case) {
+        notices.push(
+            "[uncertainty] states a part: the rest is as of an ordinary car measured by tape"
+                .to_owned(),
+        );
     }
     if count < 6 {
         let runs = if count == 1 { "one run".to_owned() } else { format!("{count} runs") };

@@ -3,6 +3,7 @@
 
 #![allow(clippy::expect_used, clippy::panic)] // Helpers of tests are tests.
 
+#[allow(dead_code)] // What the other tests use.
 mod support;
 
 use kerbside_diagnosis::{Case, Diagnosis, DiagnosisError, Settings, Verdict, Wheels, diagnose};

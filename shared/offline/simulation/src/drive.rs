@@ -19,6 +19,15 @@ pub struct Command {
     pub steering: f64,
 }
 
+/// How a car moves where a recording begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InMotion {
+    /// Speed of the motor through the mean nominal radius of the driven wheels \[m/s\].
+    pub speed: f64,
+    /// Angle of the rack \[rad\].
+    pub rack: f64,
+}
+
 /// A drive from commands.
 #[derive(Clone, Copy, Debug)]
 pub struct Drive<'a> {
@@ -40,9 +49,19 @@ impl Drive<'_> {
     /// # Panics
     /// On a step that is not positive: time would stand still.
     pub fn trajectory(&self, until: f64, out: &mut Trajectory) {
+        self.trajectory_from(&InMotion::default(), until, out);
+    }
+
+    /// The same from a car that is under way at t = 0: a recording may begin where it likes. Commands stamped before
+    /// 0 act as they would have; delayed sensors show the motion carried on backwards.
+    ///
+    /// # Panics
+    /// See [`Self::trajectory`].
+    pub fn trajectory_from(&self, motion: &InMotion, until: f64, out: &mut Trajectory) {
         check(self.step);
         let plant = Plant::new(self.vehicle, &self.effects);
         let mut actuators = Actuators::new(&plant);
+        actuators.move_on(motion.speed, motion.rack);
         for command in self.commands {
             actuators.command(command.t, command.speed, command.steering);
         }
@@ -143,6 +162,36 @@ mod tests {
     }
 
     #[test]
+    fn a_recording_that_begins_under_way_goes_on_as_the_whole_one() {
+        let vehicle = Vehicle::paper_car();
+        let late = Effects::NEUTRAL
+            .with(Parameter::find("encoder_delay", "delay").unwrap(), 0.1)
+            .with(Parameter::find("reference_delay", "delay").unwrap(), 0.1);
+        let drive = |commands| Drive {
+            vehicle: &vehicle,
+            effects: late,
+            commands,
+            start: Pose::default(),
+            step: STEP,
+        };
+        let mut whole = Trajectory::new();
+        drive(&COMMANDS).trajectory(10.0, &mut whole);
+        let cut = 2.0;
+        let now = whole.state(cut);
+        let motion = InMotion { speed: now.motor_speed, rack: now.rack };
+        let commands = COMMANDS.map(|command| Command { t: command.t - cut, ..command });
+        let mut rest = Trajectory::new();
+        Drive { start: now.pose, ..drive(&commands) }.trajectory_from(&motion, 8.0, &mut rest);
+        for step in 0..80 {
+            let t = f64::from(step) * 0.1;
+            let error = rest.reference(t).seen_from(&whole.reference(cut + t));
+            assert!(error.x.abs() + error.y.abs() + error.yaw.abs() < 1e-3, "{t}: {error:?}");
+            let (a, b) = (rest.rotation(t)[2] - rest.rotation(0.0)[2], whole.rotation(cut + t)[2]);
+            assert!((a - b + whole.rotation(cut)[2]).abs() < 1e-3, "{t}");
+        }
+    }
+
+    #[test]
     fn few_samples_are_joined_by_lines_and_hold_at_both_ends() {
         let vehicle = Vehicle::paper_car();
         let speeds = [Sample { t: 1.0, value: 0.2 }, Sample { t: 3.0, value: -0.2 }];
@@ -159,7 +208,7 @@ mod tests {
         for (t, x) in [(0.0, 0.0), (0.5, 0.1), (1.0, 0.2), (2.0, 0.3), (3.0, 0.2), (4.0, 0.0)] {
             assert!((trajectory.pose(t).x - x).abs() < 1e-9, "{t}: {:?}", trajectory.pose(t));
         }
-        assert_eq!(trajectory.pose(-1.0), Pose::default(), "before 0 as at 0");
+        assert_eq!(trajectory.pose(-1.0), Pose::new(-0.2, 0.0, 0.0), "it came from there");
         assert_eq!(trajectory.pose(9.0), trajectory.pose(4.0), "after the end as there");
         assert_eq!(trajectory.pose(f64::NAN), Pose::default());
         assert_eq!(Trajectory::new().pose(1.0), Pose::default());

@@ -44,7 +44,7 @@ mod stepper;
 mod train;
 mod trajectory;
 
-pub use drive::{Command, Drive, Follow};
+pub use drive::{Command, Drive, Follow, InMotion};
 pub use effects::{Effect, Effects, Overlay, Parameter};
 pub use noise::Noise;
 pub use sensing::SensorReading;

@@ -55,6 +55,13 @@ impl Actuators {
         }
     }
 
+    /// Lets motor and rack be under way at these values, the play's driver where the rack is.
+    pub(crate) fn move_on(&mut self, speed: f64, rack: f64) {
+        self.drive.move_to(speed);
+        self.steering.move_to(rack);
+        self.play.move_to(rack);
+    }
+
     /// Takes in a command stamped `time` \[s\]; one that is not finite is left out, as a vehicle
     /// would.
     pub(crate) fn command(&mut self, time: f64, speed: f64, steering: f64) {

@@ -7,6 +7,24 @@ use crate::stepper::{Knot, Stepper};
 use crate::train::Train;
 
 impl Knot {
+    /// The state `time` \[s\] (below 0) before this one, in the motion of this one: exactly this one where it stands.
+    fn earlier(self, time: f64) -> Self {
+        if self.motor_speed == 0.0 {
+            return self;
+        }
+        Self {
+            pose: Pose::new(
+                self.pose.x + time * self.velocity.0,
+                self.pose.y + time * self.velocity.1,
+                self.pose.yaw + time * self.yaw_rate,
+            ),
+            rotation: core::array::from_fn(|wheel| {
+                self.rotation[wheel] + time * self.rotation_rate[wheel]
+            }),
+            ..self
+        }
+    }
+
     /// The state at `time` between two knots: angles and way by cubics that keep the rates at both
     /// ends, the rates themselves by straight lines.
     #[must_use]
@@ -108,14 +126,19 @@ impl Trajectory {
         }
     }
 
-    /// The true state at `t` \[s\]: at the start before 0, at the end after it; all zero in an empty
-    /// trajectory.
+    /// The true state at `t` \[s\]: before 0 as the first motion came there, which of a car that stood is its
+    /// start; after the end as there; all zero in an empty trajectory.
     #[must_use]
     pub fn state(&self, t: f64) -> Knot {
         let Some((before, after)) = self.around(t) else {
-            return if t > 0.0 { self.knots.last() } else { self.knots.first() }
-                .copied()
-                .unwrap_or_default();
+            let first = self.knots.first().copied().unwrap_or_default();
+            return if t > 0.0 {
+                self.knots.last().copied().unwrap_or_default()
+            } else if t < 0.0 {
+                first.earlier(t)
+            } else {
+                first
+            };
         };
         Knot::between(before, after, t)
     }

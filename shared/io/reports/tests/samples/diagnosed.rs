@@ -150,6 +150,7 @@ fn diagnosis() -> Diagnosis {
                    the sensor reads, and the car drives 5 % slower than told."
             .to_owned(),
         links_named: vec![Link::SpeedActuation, Link::Ground],
+        moved: vec![Link::SpeedActuation, Link::Ground],
         effects: vec![
             effect("steering_offset", Link::Ground, "offset", "rad", between(0.022, 0.0015)),
             effect("speed_gain", Link::SpeedActuation, "gain", "", between(0.951, 0.004)),
@@ -228,6 +229,7 @@ pub(crate) fn ambiguous() -> DiagnoseReport {
         sentence: "The car turns less the faster it goes; these runs cannot tell understeer from steering compliance."
             .to_owned(),
         links_named: vec![Link::Ground],
+        moved: vec![Link::Ground],
         effects: vec![gradient],
         alternatives: vec![set("understeer", 0.55), set("steering_compliance", 0.41)],
         ranking: vec![
@@ -268,6 +270,7 @@ pub(crate) fn no_gap() -> DiagnoseReport {
         verdict: Verdict::None,
         sentence: "The simulator is as good as these runs can tell.".to_owned(),
         links_named: Vec::new(),
+        moved: Vec::new(),
         effects: Vec::new(),
         alternatives: Vec::new(),
         ranking: vec![rival("none", 0.96, 0.0, 1), rival("gyro_gain", 0.03, 2.0, 2)],
@@ -299,6 +302,7 @@ pub(crate) fn unknown() -> DiagnoseReport {
         verdict: Verdict::Unknown,
         sentence: "The car turns in by itself on one stretch of floor, and nothing that is listed does so.".to_owned(),
         links_named: vec![Link::Ground],
+        moved: vec![Link::Ground],
         effects: Vec::new(),
         alternatives: vec![Alternative { ids: vec!["lateral_drift"], probability: 0.05 }],
         ranking: vec![Rival { left_out: Vec::new(), ..rival("unknown", f64::NAN, f64::NAN, 3) }],
@@ -316,6 +320,7 @@ pub(crate) fn mistaken() -> DiagnoseReport {
         verdict: Verdict::Mistake,
         sentence: "The gyro's yaw rate has the wrong sign.".to_owned(),
         links_named: vec![Link::Sensing],
+        moved: vec![Link::Sensing],
         effects: Vec::new(),
         alternatives: Vec::new(),
         ranking: Vec::new(),

@@ -152,6 +152,11 @@ impl Noise {
         noise
     }
 
+    /// Sets a level, above 0 however little.
+    pub(crate) fn set(&mut self, level: Level, value: f64) {
+        self.log[level as usize] = math::ln(value.max(1e-9));
+    }
+
     /// The level itself.
     #[must_use]
     pub(crate) fn get(&self, level: Level) -> f64 {

@@ -12,4 +12,4 @@ pub(crate) use coefficients::Coefficients;
 pub(crate) use draw::{draw, normal};
 pub(crate) use filter::Whitener;
 pub(crate) use fit::{Evidence, fit};
-pub(crate) use level::Noise;
+pub(crate) use level::{Level, Noise};

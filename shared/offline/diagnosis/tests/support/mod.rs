@@ -88,25 +88,47 @@ pub(crate) fn case(effects: &Effects, sensors: Sensors, seed: u64) -> Case {
     if !sensors.gyro {
         vehicle.gyro = None;
     }
-    let runs = (0..6).map(|drive| run(&vehicle, effects, sensors, drive, seed)).collect();
+    let runs = (0..6)
+        .map(|drive| run(&vehicle, effects, sensors, seed, (drive, 12.0), |t| asked(drive, t)))
+        .collect();
     Case { name: "case".to_owned(), vehicle, allowance: Some(allowance()), runs }
 }
 
-fn run(vehicle: &Vehicle, effects: &Effects, sensors: Sensors, drive: usize, seed: u64) -> Run {
+/// A case of one drive of `seconds`: what the six do, one after the other without a rest.
+pub(crate) fn one_log(effects: &Effects, seconds: f64, seed: u64) -> Case {
+    let vehicle = vehicle();
+    let told = |t: f64| {
+        let drive = (0..6).rev().find(|drive| t % 66.0 >= 11.0 * f64::from(*drive)).unwrap_or(0);
+        if t < 1.0 { (0.0, 0.0) } else { asked(drive as usize, t % 11.0 + 1.0) }
+    };
+    let runs = vec![run(&vehicle, effects, ALL, seed, (0, seconds), told)];
+    Case { name: "log".to_owned(), vehicle, allowance: Some(allowance()), runs }
+}
+
+fn run(
+    vehicle: &Vehicle,
+    effects: &Effects,
+    sensors: Sensors,
+    seed: u64,
+    (drive, seconds): (usize, f64),
+    asked: impl Fn(f64) -> (f64, f64),
+) -> Run {
     let mut dice = Dice(Pcg64Mcg::seed_from_u64(seed * 100 + drive as u64));
-    let commands: Vec<Command> = (0..240)
-        .map(|k| {
-            let t = 0.05 * f64::from(k);
-            let (speed, steering) = asked(drive, t);
+    let commands: Vec<Command> = (0..)
+        .map(|k| 0.05 * f64::from(k))
+        .take_while(|t| *t < seconds - 0.01)
+        .map(|t| {
+            let (speed, steering) = asked(t);
             Command { t, speed, steering }
         })
         .collect();
     let start = Pose::new(0.3 * dice.normal(), 0.3 * dice.normal(), 0.5 * dice.normal());
     let mut trajectory = Trajectory::default();
     Drive { vehicle, effects: *effects, commands: &commands, start, step: 0.005 }
-        .trajectory(12.1, &mut trajectory);
-    let stamps =
-        |rate: f64| (0..).map(move |k| f64::from(k) / rate + 0.003).take_while(|t| *t < 12.0);
+        .trajectory(seconds + 0.1, &mut trajectory);
+    let stamps = |rate: f64| {
+        (0..).map(move |k| f64::from(k) / rate + 0.003).take_while(move |t| *t < seconds)
+    };
     let per_radian = 2048.0 / TAU;
     let mut wheels = Series::default();
     for t in stamps(50.0) {
