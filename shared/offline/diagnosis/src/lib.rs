@@ -21,6 +21,7 @@ mod path;
 mod pictures;
 mod prepare;
 mod rivals;
+mod screen;
 mod search;
 mod shrink;
 mod verdict;
