@@ -14,14 +14,12 @@ use crate::nuisance::Nuisance;
 use crate::outliers::white;
 use crate::prepare::Ready;
 use crate::rivals::{self, Shapes};
-use crate::search;
+use crate::search::{self, Hypotheses};
 
 /// Rows that show another noise than the usual one by this factor are believed.
 const CONTRADICTS: f64 = 4.0;
 /// Least noise of a speed, as a share of the limit.
 const LEAST: f64 = 1e-4;
-/// Singles from which pairs are grown.
-const KEEP: usize = 4;
 /// Groups of shapes that the noise is estimated beside, at most.
 const GROUPS: usize = 3;
 /// Logarithm of the evidence that a group must gain to be one of them.
@@ -64,16 +62,10 @@ pub(crate) fn analyse<'a>(
     let mut bench = Bench::new(ready, nuisances, &Effects::NEUTRAL, &prior);
     let all = candidates(ready.vehicle, &bench.extent);
     // Noise about no effect is no noise: a first search finds about which effects it is to be measured.
-    let first = {
-        let search = Search { bench: &bench, candidates: &all };
-        let mut singles = search::extend(&search, None, false);
-        search::rank(&mut singles);
-        let mut pairs = singles
-            .first()
-            .map(|single| search::extend(&search, Some(single), false))
-            .unwrap_or_default();
-        search::rank(&mut pairs);
-        pairs.into_iter().next().or_else(|| singles.into_iter().next())?
+    let (first, earlier) = {
+        let found = Hypotheses::brief(&Search { bench: &bench, candidates: &all });
+        let first = found.pairs.first().or(found.singles.first())?.clone();
+        (first, found.singles)
     };
     progress("noise floor", 0.25);
     bench = Bench::new(ready, nuisances, &first.effects, &prior);
@@ -86,7 +78,7 @@ pub(crate) fn analyse<'a>(
     progress("hypotheses", 0.5);
     let search = Search { bench: &bench, candidates: &all };
     let nothing = search::nothing(&search)?;
-    let fits = search::hypotheses(&search, KEEP);
+    let fits = Hypotheses::full(&search, &earlier).all();
     progress("what is not listed", 0.8);
     let shapes = rivals::shapes(&bench);
     let beside_nothing = ranked(&bench, &search, &nothing, &shapes);

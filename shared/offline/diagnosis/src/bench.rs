@@ -1,14 +1,15 @@
 //! What every hypothesis is judged on: whitened residuals, with the nuisances integrated out.
 
+use kerbside_geometry::{Drive, WHEELS};
 use kerbside_simulation::Effects;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::bins::{CHANNELS, Channels, GYRO, to_f64};
 use crate::generic::Extent;
-use crate::linear::{Design, Projection};
-use crate::noise::{Coefficients, Evidence, Noise, Whitener};
-use crate::nuisance::Nuisance;
+use crate::linear::{Design, Projection, gram};
+use crate::noise::{Coefficients, Evidence, Noise, OF_WHEEL, Whitener};
+use crate::nuisance::{CREEP, GRAVITY, Nuisance};
 use crate::path::{Path, residuals};
 use crate::prepare::Ready;
 
@@ -61,6 +62,9 @@ impl<'a> Bench<'a> {
                 };
                 let mut columns: Vec<Vec<Channels>> = nuisances.iter().map(column).collect();
                 columns.push(late(&base[*run], GYRO, ready.runs[*run].binned.width));
+                if ready.vehicle.drive == Drive::All {
+                    columns.push(uneven(ready, &coefficients[*run], &paths[*run]));
+                }
                 columns
             })
             .collect();
@@ -99,7 +103,7 @@ impl<'a> Bench<'a> {
                 DMatrix::from_vec(whitener.values, columns.len(), values)
             })
             .collect();
-        self.normals = self.designs.iter().map(|design| design.tr_mul(design)).collect();
+        self.normals = self.designs.iter().map(gram).collect();
     }
 
     /// What the noise is estimated from: the residuals about which this bench is made, and the nuisances with `more`
@@ -209,6 +213,38 @@ impl<'a> Bench<'a> {
 
 /// Delay of a gyro's reading that is no gap: a filter's or half a period of its own \[s\].
 const LATE: f64 = 0.004;
+
+/// How much further the front wheels of a car driven at all of them slip than the rear ones, per acceleration
+/// \[s^2/m\]: both axles bring up the same force, under loads of 40 to 60 % of the weight, and a tyre's slip is its force
+/// over its load (Pacejka, *Tire and Vehicle Dynamics*, chapter 1).
+const UNEVEN: f64 = 0.2 * CREEP / GRAVITY;
+
+/// What that does to the wheels while the car speeds up or slows down.
+fn uneven(ready: &Ready<'_>, coefficients: &Coefficients, path: &Path) -> Vec<Channels> {
+    let speed = |k: usize| path.steps[k].distance / coefficients.width;
+    let slip: Vec<f64> = (0..path.pose.len())
+        .map(|k| {
+            let (before, after) = (k.saturating_sub(1), k.min(path.steps.len().saturating_sub(1)));
+            if before == after || path.steps.is_empty() {
+                return 0.0;
+            }
+            let rate = (speed(after).abs() - speed(before).abs()) / coefficients.width;
+            let most = ready.vehicle.limits.acceleration;
+            UNEVEN * rate.clamp(-most, most)
+        })
+        .collect();
+    let rear: Vec<f64> = slip.iter().map(|slip| -slip).collect();
+    let mut sum = vec![[0.0; CHANNELS]; path.pose.len()];
+    for wheel in WHEELS {
+        let own = if wheel.is_front() { &slip } else { &rear };
+        for (sum, row) in sum.iter_mut().zip(coefficients.response(OF_WHEEL + wheel.index(), own)) {
+            for (sum, value) in sum.iter_mut().zip(row) {
+                *sum += value;
+            }
+        }
+    }
+    sum
+}
 
 /// What a channel does that is read a little late.
 fn late(base: &[Channels], channel: usize, width: f64) -> Vec<Channels> {

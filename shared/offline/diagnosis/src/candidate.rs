@@ -86,12 +86,19 @@ fn range(definition: &Definition, name: &str, vehicle: &Vehicle) -> (f64, f64) {
     parameter.map_or((0.0, 1.0), |p| p.range_for(vehicle))
 }
 
+/// Logarithm of the largest share of a nominal limit that lowers it.
+const HIGHEST: f64 = -1e-3;
+
 /// A limit that lowers the nominal one.
 fn limit(definition: &Definition, vehicle: &Vehicle, nominal: f64) -> Option<Fitted> {
     let low = math::ln(0.5 * range(definition, "limit", vehicle).0 / nominal);
+    // A nominal limit below all that a search covers cannot be lowered.
+    if low >= HIGHEST {
+        return None;
+    }
     let meaning = Meaning::Limit(Parameter::find(definition.id, "limit")?, nominal);
     let coordinate =
-        Coordinate { meaning, neutral: 0.0, deviation: 1.0, centre: -0.8, low, high: -1e-3 };
+        Coordinate { meaning, neutral: 0.0, deviation: 1.0, centre: -0.8, low, high: HIGHEST };
     Some((vec![coordinate], vec![vec![-0.1], vec![-0.35], vec![-0.8], vec![-1.5]]))
 }
 
@@ -222,6 +229,12 @@ impl Candidate {
             _ => *value,
         });
         names.zip(values).collect()
+    }
+
+    /// Whether every coordinate may leave its neutral value in both directions.
+    pub(crate) fn is_two_sided(&self) -> bool {
+        self.coordinates.iter().all(|c| c.low < c.neutral && c.neutral < c.high)
+            && self.definition.id != "floor_patch"
     }
 
     /// Whether it is a limit that lowers another.

@@ -178,7 +178,7 @@ impl Search<'_> {
     }
 
     /// Change of the whitened residuals per standard deviation of a coordinate.
-    fn slope(
+    pub(crate) fn slope(
         &self,
         set: &[usize],
         at: &[Vec<f64>],

@@ -26,6 +26,7 @@ mod path;
 mod pictures;
 mod prepare;
 mod rivals;
+mod screen;
 mod search;
 mod shrink;
 mod trust;

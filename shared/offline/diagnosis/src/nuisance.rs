@@ -20,10 +20,10 @@ const LENGTH: f64 = 0.002;
 const RADIUS: f64 = 0.0015;
 const LAG: f64 = 0.05;
 /// Acceleration of free fall \[m/s2\].
-const GRAVITY: f64 = 9.81;
+pub(crate) const GRAVITY: f64 = 9.81;
 /// Slip of a tyre per force over load, along and across: one over its stiffness (Pacejka, *Tire and Vehicle Dynamics*,
 /// chapter 1, has 10 to 30 per unit of load).
-const CREEP: f64 = 0.025;
+pub(crate) const CREEP: f64 = 0.025;
 const SIDE_CREEP: f64 = 0.06;
 /// Delay of a speed that is the mean over some tens of milliseconds \[s\].
 const MEAN_TIME: f64 = 0.008;

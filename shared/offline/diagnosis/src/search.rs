@@ -1,71 +1,136 @@
 //! Which sets of effects come into question: every single one, and pairs that grow from the best of them.
 
 use kerbside_geometry::math;
+use kerbside_simulation::Effects;
 use rayon::prelude::*;
 
 use crate::bench::Whole;
 use crate::fit::{Fit, Search};
 use crate::linear::Projection;
+use crate::screen::{self, Foretold, Piece, Screen};
 
 /// Discs tried along the paths, for each radius.
 const PLACES: usize = 48;
-/// Begins of a floor's patch that are fitted in full.
-const PATCHES: usize = 8;
+/// Begins of a floor's patch that are fitted, and of any other candidate.
+const PATCHES: usize = 6;
+const BEGINS: usize = 2;
 /// Valleys that are searched to their bottom.
 const VALLEYS: usize = 3;
+/// A single whose evidence lies farther below the likeliest, in logarithms, is not fitted in full.
+const REACH: f64 = 40.0;
+/// Pairs that are fitted, in a first look and in the end, those of which most is foretold.
+const FIRST_PAIRS: usize = 3;
+const PAIRS: usize = 8;
+/// Likeliest singles each of which is fitted beside its likeliest partners, and how many of these.
+const KEEP: usize = 2;
+const PARTNERS: usize = 3;
 /// Rounds of a fit that only ranks.
 const BRIEF: usize = 3;
 /// Rounds of a fit that counts.
 const FULL: usize = 10;
 
-/// Fits every candidate together with `base`, briefly or in full; none where the candidate is in the base already.
-pub(crate) fn extend(search: &Search<'_>, base: Option<&Fit>, full: bool) -> Vec<Fit> {
-    let places = places(search);
-    let all: Vec<usize> = (0..search.candidates.len()).collect();
-    all.par_iter()
-        .filter(|candidate| base.is_none_or(|base| fits_beside(search, base, **candidate)))
-        .filter_map(|candidate| extended(search, base, *candidate, &places, full))
-        .collect()
-}
-
-/// Whether a candidate is another effect than those of the base.
-fn fits_beside(search: &Search<'_>, base: &Fit, candidate: usize) -> bool {
-    let id = search.candidates[candidate].definition.id;
-    base.set.iter().all(|member| search.candidates[*member].definition.id != id)
-}
-
-/// A base with one more effect, from the best of its begins.
-fn extended(
+/// Every candidate alone, from the begins that promise most and from where an earlier search has found it; briefly, but
+/// those within reach of the likeliest in full.
+pub(crate) fn singles(
     search: &Search<'_>,
-    base: Option<&Fit>,
-    candidate: usize,
-    places: &[(f64, f64)],
+    nothing: &Whole,
+    openings: &[Piece],
+    earlier: &[Fit],
     full: bool,
-) -> Option<Fit> {
-    let (set, at) =
-        base.map_or((Vec::new(), Vec::new()), |base| (base.set.clone(), base.at.clone()));
-    let mut set = set;
-    set.push(candidate);
-    let runs = search.bench.all();
-    let projection = search.projection(&set, &runs)?;
-    let begins = search.candidates[candidate].begins(&search.bench.extent, places);
-    let with = |begin: &Vec<f64>| {
-        let mut at = at.clone();
-        at.push(begin.clone());
-        at
-    };
-    let begins =
-        if begins.len() > 8 { promising(search, &set, begins, &with, &projection) } else { begins };
-    let rounds = if full { FULL } else { BRIEF };
-    let mut fits: Vec<Fit> =
-        begins.iter().map(|begin| search.fit(&set, &with(begin), &projection, BRIEF)).collect();
-    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    if full && search.candidates[candidate].definition.id == "floor_patch" {
-        fits.truncate(VALLEYS);
-        fits = fits.into_iter().map(|fit| moved_about(search, fit, &projection)).collect();
+) -> Vec<Fit> {
+    let all: Vec<usize> = (0..search.candidates.len()).collect();
+    let mut fits: Vec<Vec<Fit>> = all
+        .par_iter()
+        .map(|candidate| {
+            let own = openings.iter().filter(|piece| piece.candidate == *candidate);
+            begun(search, nothing, &own.collect::<Vec<_>>(), earlier).unwrap_or_default()
+        })
+        .collect();
+    fits.retain(|fits| !fits.is_empty());
+    if full {
+        let best = fits.iter().map(|fits| fits[0].log_evidence()).fold(f64::NEG_INFINITY, f64::max);
+        fits.par_iter_mut().filter(|fits| fits[0].log_evidence() > best - REACH).for_each(|fits| {
+            if let Some(fit) = finished(search, fits) {
+                fits[0] = fit;
+            }
+        });
     }
-    let best = fits.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-    Some(if rounds > BRIEF { search.fit(&set, &best.at, &projection, rounds) } else { best })
+    fits.into_iter().map(|mut fits| fits.swap_remove(0)).collect()
+}
+
+/// Brief fits of one candidate, the best first.
+fn begun(
+    search: &Search<'_>,
+    nothing: &Whole,
+    openings: &[&Piece],
+    earlier: &[Fit],
+) -> Option<Vec<Fit>> {
+    let candidate = openings.first()?.candidate;
+    let projection = search.projection(&[candidate], &search.bench.all())?;
+    let foretold = screen::alone(search, nothing, openings, &projection);
+    let count = if is_patch(search, candidate) { PATCHES } else { BEGINS };
+    let before = earlier.iter().filter(|fit| fit.set == [candidate]).map(|fit| fit.at.clone());
+    let begins = before.chain(foretold.into_iter().take(count).map(|foretold| foretold.at));
+    let mut fits: Vec<Fit> =
+        begins.map(|at| search.fit(&[candidate], &at, &projection, BRIEF)).collect();
+    fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    Some(fits)
+}
+
+/// The best of a candidate's brief fits, in full.
+fn finished(search: &Search<'_>, fits: &[Fit]) -> Option<Fit> {
+    let set = &fits.first()?.set;
+    let projection = search.projection(set, &search.bench.all())?;
+    if !is_patch(search, set[0]) {
+        return Some(search.fit(set, &fits[0].at, &projection, FULL));
+    }
+    let moved: Vec<Fit> = fits
+        .iter()
+        .take(VALLEYS)
+        .map(|fit| moved_about(search, fit.clone(), &projection))
+        .collect();
+    let best = moved.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    Some(search.fit(set, &best.at, &projection, FULL))
+}
+
+fn is_patch(search: &Search<'_>, candidate: usize) -> bool {
+    search.candidates[candidate].definition.id == "floor_patch"
+}
+
+/// The `count` pairs of which most is foretold, fitted in `rounds`, and for each of the likeliest singles its likeliest
+/// partners.
+pub(crate) fn pairs(
+    search: &Search<'_>,
+    nothing: &Whole,
+    mut pieces: Vec<Piece>,
+    singles: &[Fit],
+    (count, rounds): (usize, usize),
+) -> Vec<Fit> {
+    let all = search.bench.all();
+    let fitted: Vec<Piece> =
+        singles.par_iter().filter_map(|fit| screen::fitted(search, nothing, fit)).collect();
+    pieces.extend(fitted);
+    // Pieces of one candidate stand together, in the order of candidates.
+    pieces.sort_by_key(|piece| piece.candidate);
+    let Some(projection) = search.projection(&[], &all) else { return Vec::new() };
+    let foretold =
+        Screen::new(search, nothing, &pieces.iter().collect::<Vec<_>>(), &projection).pairs();
+    let mut chosen: Vec<&Foretold> = foretold.iter().take(count).collect();
+    for single in singles.iter().take(KEEP) {
+        let beside = foretold.iter().filter(|pair| pair.set.contains(&single.set[0]));
+        for pair in beside.take(PARTNERS) {
+            if chosen.iter().all(|known| known.set != pair.set) {
+                chosen.push(pair);
+            }
+        }
+    }
+    chosen
+        .par_iter()
+        .filter_map(|pair| {
+            let projection = search.projection(&pair.set, &all)?;
+            Some(search.fit(&pair.set, &pair.at, &projection, rounds))
+        })
+        .collect()
 }
 
 /// A patch whose place and radius are tried in all directions, from far to near: its edge makes many small valleys.
@@ -113,49 +178,6 @@ const COMPASS: [[f64; 3]; 14] = [
     [0.0, -0.7, 0.7],
 ];
 
-/// The begins whose last coordinate, changed alone, gains most.
-fn promising(
-    search: &Search<'_>,
-    set: &[usize],
-    begins: Vec<Vec<f64>>,
-    with: &impl Fn(&Vec<f64>) -> Vec<Vec<f64>>,
-    projection: &Projection,
-) -> Vec<Vec<f64>> {
-    let runs = search.bench.all();
-    let whole = |at: &[Vec<f64>]| -> Whole {
-        let effects = search.effects(set, at);
-        runs.iter()
-            .map(|run| search.bench.whitened(*run, &search.bench.raw_of(*run, &effects)))
-            .collect()
-    };
-    let Some(first) = begins.first() else { return begins };
-    let mut neutral = first.clone();
-    if let Some(last) = neutral.last_mut() {
-        *last = 0.0;
-    }
-    let without = whole(&with(&neutral));
-    let mut ranked: Vec<(f64, Vec<f64>)> = begins
-        .into_iter()
-        .map(|mut begin| {
-            let size = begin.last().copied().unwrap_or_default();
-            let mut there = whole(&with(&begin));
-            for (there, without) in there.iter_mut().zip(&without) {
-                *there -= without;
-            }
-            let products = projection.products(&search.bench.designs, &[&there, &without]);
-            let share = -products[(0, 1)] / (products[(0, 0)] + 1.0);
-            let gain =
-                if share > 0.0 { products[(0, 1)].powi(2) / (products[(0, 0)] + 1.0) } else { 0.0 };
-            if let Some(last) = begin.last_mut() {
-                *last = (share * size).clamp(0.2 * size, 6.0 * size);
-            }
-            (gain, begin)
-        })
-        .collect();
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    ranked.into_iter().take(PATCHES).map(|(_, begin)| begin).collect()
-}
-
 /// Places along the paths, spread evenly.
 fn places(search: &Search<'_>) -> Vec<(f64, f64)> {
     let pitch = 0.8 * search.bench.extent.wheelbase;
@@ -176,36 +198,50 @@ pub(crate) fn nothing(search: &Search<'_>) -> Option<Fit> {
     Some(search.fit(&[], &[], &projection, 1))
 }
 
-/// Singles, and pairs grown from the `keep` likeliest of them, each fitted in full where it can still win.
-pub(crate) fn hypotheses(search: &Search<'_>, keep: usize) -> Vec<Fit> {
-    let mut singles = extend(search, None, true);
-    rank(&mut singles);
-    let mut fits = Vec::new();
-    let mut seen: Vec<Vec<usize>> = Vec::new();
-    for single in singles.iter().take(keep) {
-        let mut pairs = extend(search, Some(single), false);
-        rank(&mut pairs);
-        for pair in pairs.into_iter().take(keep) {
-            let mut set = pair.set.clone();
-            set.sort_unstable();
-            if seen.contains(&set) {
-                continue;
-            }
-            seen.push(set);
-            fits.push(pair);
-        }
+/// What a search has found.
+pub(crate) struct Hypotheses {
+    /// Every candidate alone, likeliest first.
+    pub singles: Vec<Fit>,
+    /// Pairs, likeliest first.
+    pub pairs: Vec<Fit>,
+}
+
+impl Hypotheses {
+    /// A first look: brief fits.
+    pub(crate) fn brief(search: &Search<'_>) -> Self {
+        Self::new(search, &[], false)
     }
-    let pairs: Vec<Fit> = fits
-        .par_iter()
-        .filter_map(|pair| {
-            let projection = search.projection(&pair.set, &search.bench.all())?;
-            Some(search.fit(&pair.set, &pair.at, &projection, FULL))
-        })
-        .collect();
-    deepen(search, &mut singles, &pairs);
-    singles.extend(pairs);
-    rank(&mut singles);
-    singles
+
+    /// Everything that can still win in full; `earlier` are singles that a first look has found.
+    pub(crate) fn full(search: &Search<'_>, earlier: &[Fit]) -> Self {
+        Self::new(search, earlier, true)
+    }
+
+    fn new(search: &Search<'_>, earlier: &[Fit], full: bool) -> Self {
+        let places = places(search);
+        let nothing = search.bench.whole(&Effects::NEUTRAL);
+        let all: Vec<usize> = (0..search.candidates.len()).collect();
+        let open = |candidate: &usize| screen::openings(search, &nothing, *candidate, &places);
+        let openings: Vec<Piece> = all.par_iter().flat_map(open).collect();
+        let mut singles = self::singles(search, &nothing, &openings, earlier, full);
+        rank(&mut singles);
+        let effort = if full { (PAIRS, FULL) } else { (FIRST_PAIRS, BRIEF) };
+        let mut pairs = self::pairs(search, &nothing, openings, &singles, effort);
+        rank(&mut pairs);
+        if full {
+            deepen(search, &mut singles, &pairs);
+            rank(&mut singles);
+        }
+        Self { singles, pairs }
+    }
+
+    /// Both, likeliest first.
+    pub(crate) fn all(self) -> Vec<Fit> {
+        let mut all = self.singles;
+        all.extend(self.pairs);
+        rank(&mut all);
+        all
+    }
 }
 
 /// Begins singles again where a pair has found a better place for one of its two.

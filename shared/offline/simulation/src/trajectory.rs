@@ -34,7 +34,7 @@ impl Knot {
             return *after;
         }
         let share = (time - before.time) / span;
-        let line = |from: f64, to: f64| from + share * (to - from);
+        let line = |from: f64, to: f64| line(share, from, to);
         let cubic = |from: f64, slope: f64, to: f64, end_slope: f64| {
             hermite(share, span, [from, slope, to, end_slope])
         };
@@ -60,6 +60,11 @@ impl Knot {
             }),
         }
     }
+}
+
+/// The straight line through two values, at `share` of the way between them.
+fn line(share: f64, from: f64, to: f64) -> f64 {
+    from + share * (to - from)
 }
 
 /// The cubic through two values with two slopes, at `share` of the way between them.
@@ -143,6 +148,21 @@ impl Trajectory {
         Knot::between(before, after, t)
     }
 
+    /// What `of` makes of the knots around `t` and the share of the way between them; of one knot outside the drive.
+    fn shown<R>(&self, t: f64, of: impl Fn(&Knot, &Knot, f64) -> R) -> R {
+        let Some((before, after)) = self.around(t) else {
+            let only = if t > 0.0 { self.knots.last() } else { self.knots.first() };
+            let only = only.copied().unwrap_or_default();
+            return of(&only, &only, 0.0);
+        };
+        let span = after.time - before.time;
+        if span <= 0.0 {
+            of(after, after, 0.0)
+        } else {
+            of(before, after, (t - before.time) / span)
+        }
+    }
+
     /// The knots before and after `t`; none outside the drive.
     fn around(&self, t: f64) -> Option<(&Knot, &Knot)> {
         if t <= 0.0 || t.is_nan() {
@@ -176,7 +196,7 @@ impl Trajectory {
     pub fn rotation(&self, t: f64) -> [f64; 4] {
         self.sensors
             .as_ref()
-            .map_or([0.0; 4], |sensors| sensors.shown(self.state(sensors.encoder_time(t)).rotation))
+            .map_or([0.0; 4], |sensors| sensors.shown(self.turned(sensors.encoder_time(t))))
     }
 
     /// Surface speeds of fl, fr, rl, rr that the vehicle reports at `t` \[s\] in place of counts
@@ -184,27 +204,57 @@ impl Trajectory {
     #[must_use]
     pub fn wheel_speed(&self, t: f64) -> [f64; 4] {
         self.sensors.as_ref().map_or([0.0; 4], |sensors| {
-            sensors.wheel_speed(self.state(sensors.encoder_time(t)).rotation_rate)
+            let rates = self.shown(sensors.encoder_time(t), |a, b, share| {
+                core::array::from_fn(|wheel| {
+                    line(share, a.rotation_rate[wheel], b.rotation_rate[wheel])
+                })
+            });
+            sensors.wheel_speed(rates)
         })
     }
 
     /// What the steering sensor reads at `t` \[s\] \[rad\].
     #[must_use]
     pub fn steering(&self, t: f64) -> f64 {
-        self.sensors.as_ref().map_or(0.0, |sensors| sensors.steering(self.state(t).rack))
+        self.sensors.as_ref().map_or(0.0, |sensors| {
+            sensors.steering(self.shown(t, |a, b, share| line(share, a.rack, b.rack)))
+        })
     }
 
     /// What the gyro reads at `t` \[s\] \[rad/s\].
     #[must_use]
     pub fn yaw_rate(&self, t: f64) -> f64 {
-        self.sensors.as_ref().map_or(0.0, |sensors| sensors.yaw_rate(self.state(t).yaw_rate))
+        self.sensors.as_ref().map_or(0.0, |sensors| {
+            sensors.yaw_rate(self.shown(t, |a, b, share| line(share, a.yaw_rate, b.yaw_rate)))
+        })
     }
 
     /// What the reference shows in the row that it stamps `t` \[s\], yaw not wrapped.
     #[must_use]
     pub fn reference(&self, t: f64) -> Pose {
         self.sensors.as_ref().map_or(Pose::default(), |sensors| {
-            sensors.reference(&self.state(sensors.reference_time(t)).pose)
+            sensors.reference(&self.shown(sensors.reference_time(t), |a, b, share| {
+                let span = b.time - a.time;
+                let cubic = |from: f64, slope: f64, to: f64, end_slope: f64| {
+                    hermite(share, span, [from, slope, to, end_slope])
+                };
+                Pose::new(
+                    cubic(a.pose.x, a.velocity.0, b.pose.x, b.velocity.0),
+                    cubic(a.pose.y, a.velocity.1, b.pose.y, b.velocity.1),
+                    cubic(a.pose.yaw, a.yaw_rate, b.pose.yaw, b.yaw_rate),
+                )
+            }))
+        })
+    }
+
+    /// True rotation of the wheels at `t` \[s\] \[rad\].
+    fn turned(&self, t: f64) -> [f64; 4] {
+        self.shown(t, |a, b, share| {
+            let span = b.time - a.time;
+            core::array::from_fn(|wheel| {
+                let (rate, end_rate) = (a.rotation_rate[wheel], b.rotation_rate[wheel]);
+                hermite(share, span, [a.rotation[wheel], rate, b.rotation[wheel], end_rate])
+            })
         })
     }
 }

@@ -24,16 +24,18 @@ struct Update {
     gain: State,
     /// One over the innovation's standard deviation.
     weight: f64,
+    /// Where the channel's row of the measurement matrix has entries, in all rows.
+    row: core::ops::Range<usize>,
 }
 
 /// The filter of one run, ready to whiten any residual of it.
 #[derive(Clone, Debug)]
 pub(crate) struct Whitener {
     steps: Vec<StepCoefficients>,
-    first: [[f64; INPUTS]; 5],
     decay: State,
-    speeds: bool,
     updates: Vec<Vec<Update>>,
+    /// Entries of all measurement rows: state and factor.
+    rows: Vec<(usize, f64)>,
     /// Sum of the logarithms of the innovations' variances.
     pub log_determinant: f64,
     /// Number of values.
@@ -54,6 +56,7 @@ impl Whitener {
         let mut covariance = model.initial();
         let (mut log_determinant, mut values) = (0.0, 0);
         let mut updates = Vec::with_capacity(coefficients.present.len());
+        let mut rows = Vec::new();
         for (k, present) in coefficients.present.iter().enumerate() {
             let rate = if k == 0 { &coefficients.first } else { &coefficients.steps[k - 1].rate };
             if k > 0 {
@@ -62,7 +65,10 @@ impl Whitener {
             let mut bin = Vec::new();
             for channel in (0..CHANNELS).filter(|channel| present[*channel]) {
                 let row = measurement(channel, rate, coefficients.speeds);
-                let update = model.update(&mut covariance, channel, &row);
+                let mut update = model.update(&mut covariance, channel, &row);
+                update.row.start = rows.len();
+                rows.extend_from_slice(row.entries());
+                update.row.end = rows.len();
                 log_determinant -= 2.0 * math::ln(update.weight);
                 values += 1;
                 bin.push(update);
@@ -71,10 +77,9 @@ impl Whitener {
         }
         Self {
             steps: coefficients.steps.clone(),
-            first: coefficients.first,
             decay: model.decay,
-            speeds: coefficients.speeds,
             updates,
+            rows,
             log_determinant,
             values,
         }
@@ -84,14 +89,14 @@ impl Whitener {
     pub(crate) fn apply(&self, residuals: &[Channels], out: &mut Whitened) {
         let mut x: State = [0.0; STATES];
         for (k, updates) in self.updates.iter().enumerate() {
-            let rate = if k == 0 { &self.first } else { &self.steps[k - 1].rate };
             if k > 0 {
                 advance(&mut x, &self.steps[k - 1], &self.decay);
             }
             for update in updates {
-                let row = measurement(update.channel, rate, self.speeds);
+                let entries = &self.rows[update.row.clone()];
+                let expected: f64 = entries.iter().map(|(state, factor)| factor * x[*state]).sum();
                 let value = residuals[k][update.channel];
-                let innovation = if value.is_finite() { value - row.of(&x) } else { 0.0 };
+                let innovation = if value.is_finite() { value - expected } else { 0.0 };
                 for (state, gain) in x.iter_mut().zip(&update.gain) {
                     *state += gain * innovation;
                 }
@@ -305,7 +310,7 @@ impl Model {
                 *value -= gain * spread;
             }
         }
-        Update { channel, gain, weight: 1.0 / variance.sqrt() }
+        Update { channel, gain, weight: 1.0 / variance.sqrt(), row: 0..0 }
     }
 }
 

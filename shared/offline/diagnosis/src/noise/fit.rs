@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::level::{COUNT, Level, Noise};
 use super::{Coefficients, Whitener};
 use crate::bins::{self, Channels};
+use crate::linear::gram;
 
 /// Rounds of the search at most.
 const ROUNDS: usize = 12;
@@ -157,7 +158,7 @@ fn objective(evidence: &[Evidence], prior: &Noise, noise: &Noise) -> f64 {
             (
                 whitener.log_determinant,
                 residual.norm_squared(),
-                design.tr_mul(&design),
+                gram(&design),
                 design.tr_mul(&residual),
             )
         })
