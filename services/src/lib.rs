@@ -31,6 +31,7 @@ pub mod replay;
 pub mod reproduce;
 pub mod service;
 pub mod simulate;
+pub mod soak;
 pub mod supervisor;
 pub mod tables;
 pub mod tracker;

@@ -21,6 +21,7 @@ use crate::replay::ReplayArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::service::{Service, ServiceArgs};
 use crate::simulate::SimulateArgs;
+use crate::soak::SoakArgs;
 use crate::trial::TrialArgs;
 use crate::vehicle::VehicleArgs;
 use crate::{
@@ -104,6 +105,9 @@ enum Verb {
     /// Measure hops, the pipeline and the start, and hold them against limits.
     #[command(subcommand, after_help = "Example: kerbside bench transport --json")]
     Bench(crate::bench::BenchVerb),
+    /// Drive again and again under faults, and hold the stack against what no fault may break.
+    #[command(after_help = crate::soak::EXAMPLES)]
+    Soak(SoakArgs),
     /// Run one process of a stack; the supervisor starts them by itself.
     #[command(subcommand, after_help = "Example: kerbside service tracker --instance bay2")]
     Service(ServiceVerb),
@@ -188,6 +192,7 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             logging::start("bench", level.unwrap_or("warn"), false);
             crate::bench::run(verb)
         }
+        Verb::Soak(args) => logged("soak", level, || crate::soak::run(args)),
         Verb::Arm(_)
         | Verb::Stop(_)
         | Verb::Down(_)
@@ -209,6 +214,16 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             recording::run(verb)
         }
     }
+}
+
+/// Runs a verb that logs as `name`, warnings and worse where no level is given.
+fn logged(
+    name: &'static str,
+    level: Option<&str>,
+    verb: impl FnOnce() -> Result<Exit, Failure>,
+) -> Result<Exit, Failure> {
+    logging::start(name, level.unwrap_or("warn"), false);
+    verb()
 }
 
 fn operate(verb: &Verb) -> Result<Exit, Failure> {
