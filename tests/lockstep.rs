@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use clap::Parser;
-use kerbside::lockstep::{LineFault, Script};
+use kerbside::lockstep::{Fault, Kind, LineMishap, Schedule, Way};
 use kerbside::manoeuvre::End;
 use kerbside::park::judge::{Verdict, judge};
 use kerbside::park::{Job, ParkArgs, Run, job, simulated};
@@ -29,16 +29,16 @@ fn job_of(words: &[&str], seed: u64) -> Job {
     job(&arguments.park, seed, Path::new("/nonexistent")).unwrap()
 }
 
-fn drive(words: &[&str], seed: u64, script: Script) -> (Run, Verdict) {
+fn drive(words: &[&str], seed: u64, schedule: Schedule) -> (Run, Verdict) {
     let job = job_of(words, seed);
-    let run = simulated::run(&job, script).unwrap();
+    let run = simulated::run(&job, schedule).unwrap();
     let verdict = judge(&run.trace, &job.scenario, &job.service.vehicle, run.end);
     (run, verdict)
 }
 
 /// When the car of seed 1 is well on its way in the garage scene.
 fn under_way() -> Nanos {
-    let (run, _) = drive(&["garage"], 1, Script::default());
+    let (run, _) = drive(&["garage"], 1, Schedule::default());
     let moving = run.trace.truth.iter().find(|truth| truth.distance > 0.3).unwrap();
     // Kills fall on the grid of simulated time.
     moving.header.stamp / 1_000_000 * 1_000_000 - SECOND
@@ -58,7 +58,7 @@ fn every_scene_is_parked_from_disturbed_starts() {
     for scene in ["garage", "parallel", "garage-full-size", "parallel-full-size"] {
         let (mut positions, mut headings) = (0.0, 0.0);
         for seed in 1..=5 {
-            let (run, verdict) = drive(&[scene], seed, Script::default());
+            let (run, verdict) = drive(&[scene], seed, Schedule::default());
             assert!(verdict.parked, "{scene}, seed {seed}: {:?} {}", run.end, verdict.cause);
             let error = verdict.end_error.unwrap();
             positions += error.x.hypot(error.y) / 5.0;
@@ -73,7 +73,7 @@ fn every_scene_is_parked_from_disturbed_starts() {
 #[test]
 fn gear_changes_and_clearances_keep_to_the_scenes() {
     for (scene, changes, clearance) in [("garage", 1, 0.05), ("parallel", 4, 0.03)] {
-        let (run, verdict) = drive(&[scene], 2, Script::default());
+        let (run, verdict) = drive(&[scene], 2, Schedule::default());
         let plan = &run.trace.plans[0].head;
         assert!(plan.gear_changes <= changes && plan.clearance >= clearance, "{scene}: {plan:?}");
         assert!(plan.steering <= 28.0_f64.to_radians() + 1e-9, "{scene}: {plan:?}");
@@ -92,9 +92,9 @@ fn the_same_seed_gives_the_same_bits() {
         let truth = run.trace.truth.iter().flat_map(|sample| bytemuck::bytes_of(sample).to_vec());
         odometry.chain(commands).chain(truth).collect()
     };
-    let (one, _) = drive(&["parallel"], 7, Script::default());
-    let (two, _) = drive(&["parallel"], 7, Script::default());
-    let (other, _) = drive(&["parallel"], 8, Script::default());
+    let (one, _) = drive(&["parallel"], 7, Schedule::default());
+    let (two, _) = drive(&["parallel"], 7, Schedule::default());
+    let (other, _) = drive(&["parallel"], 8, Schedule::default());
     assert!(bits(&one) == bits(&two), "two runs of seed 7 differ");
     assert!(bits(&one) != bits(&other), "seeds 7 and 8 are one run");
 }
@@ -109,8 +109,8 @@ fn a_death_on_the_control_path_stops_the_car_and_is_named() {
         Process::Tracker,
         Process::Actuation,
     ] {
-        let script = Script { kills: vec![(at, process)], ..Script::default() };
-        let (run, verdict) = drive(&["garage"], 1, script);
+        let schedule = Schedule::kills(&[(at, process)]);
+        let (run, verdict) = drive(&["garage"], 1, schedule);
         assert_eq!(run.end, End::Stopped(Cause::Died), "{process}: {}", verdict.cause);
         assert!(verdict.cause.contains(process.name()), "{process}: {}", verdict.cause);
         assert!(!verdict.parked && !verdict.collision, "{process}");
@@ -130,8 +130,8 @@ fn after_a_death_the_operator_completes_the_manoeuvre() {
         Process::Tracker,
         Process::Actuation,
     ] {
-        let script = Script { kills: vec![(at, process)], ..Script::default() };
-        let (run, verdict) = drive(&["garage", "--rearm"], 1, script);
+        let schedule = Schedule::kills(&[(at, process)]);
+        let (run, verdict) = drive(&["garage", "--rearm"], 1, schedule);
         assert!(verdict.parked, "{process}: {:?} {}", run.end, verdict.cause);
         assert_eq!(run.trace.restarts(), 1, "{process}");
         assert!(run.trace.plans.len() >= 2, "{process}: planned anew");
@@ -145,8 +145,8 @@ fn after_a_death_the_operator_completes_the_manoeuvre() {
 
 #[test]
 fn a_restarted_estimator_goes_on_with_what_it_had_learnt_of_the_vehicle() {
-    let script = Script { kills: vec![(under_way(), Process::Estimator)], ..Script::default() };
-    let (run, _) = drive(&["garage", "--rearm"], 1, script);
+    let schedule = Schedule::kills(&[(under_way(), Process::Estimator)]);
+    let (run, _) = drive(&["garage", "--rearm"], 1, schedule);
     let restored = |odometry: &Odometry| odometry.reset_reason == ResetReason::Restored.code();
     let lives: Vec<_> = run
         .trace
@@ -169,8 +169,8 @@ fn a_restarted_estimator_goes_on_with_what_it_had_learnt_of_the_vehicle() {
 fn the_death_of_planner_or_recorder_does_not_stop_the_car() {
     let at = under_way();
     for process in [Process::Planner, Process::Recorder] {
-        let script = Script { kills: vec![(at, process)], ..Script::default() };
-        let (run, verdict) = drive(&["garage"], 1, script);
+        let schedule = Schedule::kills(&[(at, process)]);
+        let (run, verdict) = drive(&["garage"], 1, schedule);
         assert!(verdict.parked, "{process}: {:?} {}", run.end, verdict.cause);
         assert_eq!((run.trace.restarts(), run.trace.plans.len()), (1, 1), "{process}");
     }
@@ -179,11 +179,11 @@ fn the_death_of_planner_or_recorder_does_not_stop_the_car() {
 #[test]
 fn an_inhibit_stops_the_car_until_somebody_arms() {
     let at = under_way();
-    let script = Script { inhibits: vec![(at, SECOND)], ..Script::default() };
-    let (run, verdict) = drive(&["garage"], 1, script.clone());
+    let schedule = Schedule::new(vec![Fault { at, kind: Kind::Inhibit(SECOND) }]);
+    let (run, verdict) = drive(&["garage"], 1, schedule.clone());
     assert_eq!(run.end, End::Stopped(Cause::Inhibited), "{}", verdict.cause);
     assert!(rolled_after(&run, at) < 0.10);
-    let (run, verdict) = drive(&["garage", "--rearm"], 1, script);
+    let (run, verdict) = drive(&["garage", "--rearm"], 1, schedule);
     assert!(verdict.parked, "{:?} {}", run.end, verdict.cause);
     let latched = |code: u8| code == AlterReason::Inhibited.code();
     assert!(run.trace.actuators.iter().any(|actuator| latched(actuator.latch)));
@@ -192,21 +192,40 @@ fn an_inhibit_stops_the_car_until_somebody_arms() {
 #[test]
 fn a_lost_line_stops_the_car_and_its_return_is_found() {
     let at = under_way();
-    let silence = LineFault::Silence { from: at, to: at + 600_000_000 };
-    let script = Script { line: vec![silence], ..Script::default() };
-    let (run, verdict) = drive(&["garage"], 1, script.clone());
+    let kind = Kind::Line { way: Way::ToHost, mishap: LineMishap::Silence, span: 600_000_000 };
+    let schedule = Schedule::new(vec![Fault { at, kind }]);
+    let (run, verdict) = drive(&["garage"], 1, schedule.clone());
     assert!(matches!(run.end, End::Stopped(_)), "{:?} {}", run.end, verdict.cause);
     assert!(rolled_after(&run, at) < 0.15);
-    let (run, verdict) = drive(&["garage", "--rearm"], 1, script);
+    let (run, verdict) = drive(&["garage", "--rearm"], 1, schedule);
     assert!(verdict.parked, "{:?} {}", run.end, verdict.cause);
+}
+
+#[test]
+fn a_vehicle_that_stopped_for_silence_does_not_drive_on_by_itself() {
+    let at = under_way();
+    for span in [330, 400, 1_200].map(|ms| ms * 1_000_000) {
+        let kind = Kind::Line { way: Way::ToVehicle, mishap: LineMishap::Silence, span };
+        let schedule = Schedule::new(vec![Fault { at, kind }]);
+        let (run, verdict) = drive(&["garage"], 1, schedule.clone());
+        assert_eq!(run.end, End::Stopped(Cause::LineLost), "{span}: {}", verdict.cause);
+        assert!(rolled_after(&run, at) < 0.15, "{span}");
+        let (run, verdict) = drive(&["garage", "--rearm"], 1, schedule);
+        assert!(verdict.parked, "{span}: {:?} {}", run.end, verdict.cause);
+        assert!(run.trace.plans.len() >= 2, "{span}: planned anew");
+    }
 }
 
 #[test]
 fn garbage_on_the_line_costs_nothing_but_itself() {
     let at = under_way();
-    let garbage = |at: Nanos| LineFault::Garbage { at, bytes: (0..200_u8).collect() };
-    let line = (0..50).map(|index| garbage(at + index * 10_000_000)).collect();
-    let (run, verdict) = drive(&["garage"], 1, Script { line, ..Script::default() });
+    let garbage = |index: Nanos| {
+        let mishap = LineMishap::Garbage((0..200_u8).collect());
+        let kind = Kind::Line { way: Way::ToHost, mishap, span: 1_000_000 };
+        Fault { at: at + index * 10_000_000, kind }
+    };
+    let schedule = Schedule::new((0..50).map(garbage).collect());
+    let (run, verdict) = drive(&["garage"], 1, schedule);
     assert!(verdict.parked, "{:?} {}", run.end, verdict.cause);
     assert_eq!(run.trace.restarts(), 0);
 }
@@ -214,8 +233,8 @@ fn garbage_on_the_line_costs_nothing_but_itself() {
 #[test]
 fn two_deaths_at_once_are_survived() {
     let at = under_way();
-    let kills = vec![(at, Process::Ingest), (at, Process::Estimator)];
-    let (run, verdict) = drive(&["garage", "--rearm"], 1, Script { kills, ..Script::default() });
+    let kills = [(at, Process::Ingest), (at, Process::Estimator)];
+    let (run, verdict) = drive(&["garage", "--rearm"], 1, Schedule::kills(&kills));
     assert!(verdict.parked, "{:?} {}", run.end, verdict.cause);
     assert_eq!(run.trace.restarts(), 2);
 }
@@ -223,8 +242,8 @@ fn two_deaths_at_once_are_survived() {
 #[test]
 fn a_process_that_keeps_dying_is_given_up() {
     let at = under_way();
-    let kills = (0..40).map(|index| (at + index * SECOND, Process::Tracker)).collect();
-    let (run, verdict) = drive(&["garage", "--rearm"], 1, Script { kills, ..Script::default() });
+    let kills: Vec<_> = (0..40).map(|index| (at + index * SECOND, Process::Tracker)).collect();
+    let (run, verdict) = drive(&["garage", "--rearm"], 1, Schedule::kills(&kills));
     assert_eq!(run.end, End::Stopped(Cause::GaveUp), "{}", verdict.cause);
 }
 
@@ -238,8 +257,8 @@ fn effects_of_an_overlay_show_in_how_the_car_parks() {
     let words = ["garage", "--effects", file.to_str().unwrap()];
     let job = job_of(&words, 1);
     assert!(job.command_line.contains("--effects") && job.configuration.len() == 4);
-    let (with, told) = drive(&words, 1, Script::default());
-    let (without, nominal) = drive(&["garage"], 1, Script::default());
+    let (with, told) = drive(&words, 1, Schedule::default());
+    let (without, nominal) = drive(&["garage"], 1, Schedule::default());
     let way = |run: &Run| run.trace.truth.last().unwrap().distance;
     let believed = |verdict: &Verdict| {
         let estimate = verdict.estimate_error.unwrap();

@@ -36,6 +36,7 @@ pub mod replay;
 pub mod reproduce;
 pub mod service;
 pub mod simulate;
+pub mod soak;
 pub mod supervisor;
 pub mod tables;
 pub mod tools;

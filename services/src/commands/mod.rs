@@ -29,6 +29,7 @@ use crate::replay::ReplayArgs;
 use crate::reproduce::ReproduceArgs;
 use crate::service::{Service, ServiceArgs};
 use crate::simulate::SimulateArgs;
+use crate::soak::SoakArgs;
 use crate::tools;
 use crate::trial::TrialArgs;
 use crate::vehicle::VehicleArgs;
@@ -132,6 +133,9 @@ enum Verb {
         after_help = "Example: kerbside bindings python --out kerbside_messages.py"
     )]
     Bindings(BindingsVerb),
+    /// Drive again and again under faults, and hold the stack against what no fault may break.
+    #[command(after_help = crate::soak::EXAMPLES)]
+    Soak(SoakArgs),
     /// Say what this machine has and lacks for kerbside, and what to do about it.
     #[command(after_help = "Example: kerbside doctor --config /etc/kerbside/stack.toml")]
     Doctor(DoctorArgs),
@@ -195,36 +199,16 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             logging::start("replay", level, false);
             crate::replay::run(&ReplayArgs { log: Some(level.to_owned()), ..args.clone() })
         }
-        Verb::Calibrate(args) => {
-            logging::start("calibrate", level.unwrap_or("warn"), false);
-            crate::calibrate::run(args)
-        }
-        Verb::Simulate(args) => {
-            logging::start("simulate", level.unwrap_or("warn"), false);
-            crate::simulate::run(args)
-        }
-        Verb::Diagnose(args) => {
-            logging::start("diagnose", level.unwrap_or("warn"), false);
-            crate::diagnose::run(args)
-        }
-        Verb::Reproduce(args) => {
-            logging::start("reproduce", level.unwrap_or("warn"), false);
-            crate::reproduce::run(args)
-        }
-        Verb::Trial(args) => {
-            logging::start("trial", level.unwrap_or("warn"), false);
-            crate::trial::run(args)
-        }
-        Verb::Compare(verb) => {
-            logging::start("compare", level.unwrap_or("warn"), false);
-            crate::compare::run(verb)
-        }
+        Verb::Calibrate(args) => logged("calibrate", level, || crate::calibrate::run(args)),
+        Verb::Simulate(args) => logged("simulate", level, || crate::simulate::run(args)),
+        Verb::Diagnose(args) => logged("diagnose", level, || crate::diagnose::run(args)),
+        Verb::Reproduce(args) => logged("reproduce", level, || crate::reproduce::run(args)),
+        Verb::Trial(args) => logged("trial", level, || crate::trial::run(args)),
+        Verb::Compare(verb) => logged("compare", level, || crate::compare::run(verb)),
         Verb::Up(args) => up::run(args, level),
         Verb::Service(verb) => serve(verb, level),
-        Verb::Bench(verb) => {
-            logging::start("bench", level.unwrap_or("warn"), false);
-            crate::bench::run(verb)
-        }
+        Verb::Bench(verb) => logged("bench", level, || crate::bench::run(verb)),
+        Verb::Soak(args) => logged("soak", level, || crate::soak::run(args)),
         Verb::Arm(_)
         | Verb::Stop(_)
         | Verb::Down(_)
@@ -235,10 +219,12 @@ pub fn run(cli: &Cli) -> Result<Exit, Failure> {
             kerbside_runtime::end_on_broken_pipe();
             operate(&cli.verb)
         }
-        Verb::Topics(_) | Verb::Echo(_) | Verb::Hz(_) | Verb::Top(_) => look(&cli.verb, level),
-        Verb::Bindings(verb) => crate::bindings::run(verb),
+        Verb::Topics(_) | Verb::Echo(_) | Verb::Hz(_) | Verb::Top(_) => {
+            logged("operator", level, || look(&cli.verb))
+        }
         Verb::Config(_)
         | Verb::Recording(_)
+        | Verb::Bindings(_)
         | Verb::Doctor(_)
         | Verb::Completions(_)
         | Verb::Man(_) => {
@@ -257,8 +243,18 @@ fn outlive_file_limits() -> Result<(), Failure> {
         .map_err(Failure::internal)
 }
 
-fn look(verb: &Verb, level: Option<&str>) -> Result<Exit, Failure> {
-    logging::start("operator", level.unwrap_or("warn"), false);
+/// Runs a verb that logs as `name`, warnings and worse where no level is given.
+fn logged(
+    name: &'static str,
+    level: Option<&str>,
+    verb: impl FnOnce() -> Result<Exit, Failure>,
+) -> Result<Exit, Failure> {
+    logging::start(name, level.unwrap_or("warn"), false);
+    verb()
+}
+
+/// Verbs that look at a running stack.
+fn look(verb: &Verb) -> Result<Exit, Failure> {
     match verb {
         Verb::Topics(args) => tools::topics(args),
         Verb::Echo(args) => tools::echo(args),
@@ -273,6 +269,7 @@ fn tell(verb: &Verb) -> Result<Exit, Failure> {
     match verb {
         Verb::Config(verb) => config::run(verb),
         Verb::Recording(verb) => recording::run(verb),
+        Verb::Bindings(verb) => crate::bindings::run(verb),
         Verb::Doctor(args) => crate::doctor::run(args),
         Verb::Completions(args) => completions::run(args),
         Verb::Man(args) => man::run(args),

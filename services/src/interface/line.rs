@@ -18,6 +18,9 @@ use super::serial::Line;
 use crate::exit::{Exit, Failure};
 use crate::life::{Life, Service, nanos};
 
+/// A line that is silent is closed at the latest so long after it counts as lost, whatever it still carries to the
+/// vehicle: no stop ramp takes longer \[ns\].
+const RAMP: Nanos = 2_000_000_000;
 /// Time between attempts to open the line, and longest wait for input \[ns\].
 const REOPEN: Nanos = 100_000_000;
 const WAIT: Nanos = 5_000_000;
@@ -29,6 +32,12 @@ pub struct LineStage {
     actuators: Actuators,
     sent: Option<(u64, u64)>,
     heard: Option<Nanos>,
+    /// The newest reading says that commands reach the vehicle.
+    heeds: bool,
+    /// When the vehicle stopped because they no longer did \[ns\].
+    stopped: Option<Nanos>,
+    /// The newest command asks for motion.
+    moves: bool,
 }
 
 impl LineStage {
@@ -46,10 +55,13 @@ impl LineStage {
         mut reading: impl FnMut(&Reading, u32),
         mut news: impl FnMut(HostEvent),
     ) {
-        let heard = &mut self.heard;
-        self.end.receive(bytes, &mut |event| match event {
+        let Self { end, heard, heeds, stopped, .. } = self;
+        end.receive(bytes, &mut |event| match event {
             HostEvent::Reading { reading: content, line_errors } => {
                 *heard = Some(now);
+                if core::mem::replace(heeds, !content.silent) && content.silent {
+                    *stopped = Some(now);
+                }
                 reading(&content, line_errors);
             }
             other => news(other),
@@ -57,16 +69,21 @@ impl LineStage {
     }
 
     /// The frame for the newest actuator sample, once per sample, while it is fresh.
+    ///
+    /// A vehicle that stopped by itself, because commands stayed away, is not driven on: until it heeds one, it gets
+    /// none but zero speed.
     pub fn command(&mut self, now: Nanos, actuator: &Actuator, freshness: Nanos) -> Option<Frame> {
         let id = (actuator.header.epoch, actuator.header.sequence);
-        if self.sent == Some(id) || now.saturating_sub(actuator.header.sent) > freshness {
+        let stale = now.saturating_sub(actuator.header.sent) > freshness;
+        let drives_on = !self.heeds && actuator.speed != 0.0;
+        if self.sent == Some(id) || stale || drives_on {
             return None;
         }
         // The gate speaks of the vehicle's motion, the line of what its actuators are told.
         let (speed, steering) = self.actuators.command(actuator.speed, actuator.steering);
         #[allow(clippy::cast_possible_truncation)] // the line carries single precision
         let frame = self.end.command(speed as f32, steering as f32)?;
-        self.sent = Some(id);
+        (self.sent, self.moves) = (Some(id), actuator.speed != 0.0);
         Some(frame)
     }
 
@@ -78,19 +95,33 @@ impl LineStage {
     /// The line is gone.
     pub fn line_lost(&mut self) {
         self.end.line_lost();
-        self.heard = None;
+        (self.heard, self.heeds, self.moves) = (None, false, false);
     }
 
-    /// Whether readings come and commands count.
+    /// Whether a line opened at `opened`, on which nothing is heard for longer than `silence`, is to be opened anew.
+    ///
+    /// What is silent may still carry commands: the gate's stop ramp reaches the vehicle sooner than its own silence
+    /// time-out would stop it, so the line is kept until the ramp is over.
     #[must_use]
-    pub fn is_up(&self, now: Nanos, silence: Nanos) -> bool {
-        self.end.is_open() && self.heard.is_some_and(|heard| now.saturating_sub(heard) <= silence)
+    pub fn is_lost(&self, now: Nanos, opened: Nanos, silence: Nanos) -> bool {
+        let silent = now.saturating_sub(self.heard.unwrap_or(0).max(opened));
+        silent > silence && (!self.moves || silent > silence + RAMP)
     }
 
-    /// When the last reading came.
+    /// What is missing where not both directions carry: readings come, commands count, and they reach the vehicle.
+    ///
+    /// A vehicle that stopped because they did not stays missing for `silence` (longer than two heartbeats), however
+    /// soon they reach it again: it must not drive on before somebody has noticed.
     #[must_use]
-    pub fn heard(&self) -> Option<Nanos> {
-        self.heard
+    pub fn waits_for(&self, now: Nanos, silence: Nanos) -> Option<&'static str> {
+        let within = |at: Nanos| now.saturating_sub(at) <= silence;
+        if !(self.end.is_open() && self.heard.is_some_and(within)) {
+            Some("the vehicle's line")
+        } else if !self.heeds || self.stopped.is_some_and(within) {
+            Some("commands to reach the vehicle")
+        } else {
+            None
+        }
     }
 }
 
@@ -174,8 +205,7 @@ impl Door {
     }
 
     fn close_when_silent(&mut self, stage: &mut LineStage, silence: Nanos) {
-        let newest = stage.heard().unwrap_or(0).max(self.opened);
-        if now().saturating_sub(newest) > silence {
+        if stage.is_lost(now(), self.opened, silence) {
             self.close(stage, "silent");
         }
     }
@@ -212,7 +242,7 @@ pub fn run(service: &Service) -> Result<Exit, Failure> {
         life.checkpoint(1);
         life.end();
         door.close_when_silent(&mut stage, silence);
-        life.waits_for(if stage.is_up(now(), silence) { None } else { Some("the vehicle's line") });
+        life.waits_for(stage.waits_for(now(), silence));
     }
     Ok(life.exit())
 }

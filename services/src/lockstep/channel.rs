@@ -2,21 +2,40 @@
 
 use std::collections::VecDeque;
 
-use kerbside_messages::{Admission, Admitted, Message, Nanos, seal};
+use kerbside_messages::{Admission, Admitted, Message, Nanos, Process, Refusals, seal};
 
-/// A topic with one publisher and one reader.
-#[derive(Debug)]
-pub struct Channel<M: Message> {
+use super::mishap::{Mishap, Passing};
+
+/// Samples that wait for a reader of every one; more push out the oldest.
+const IN_ORDER: usize = 512;
+/// The same for a reader of the newest: room for those that are under way.
+const NEWEST: usize = 64;
+
+/// Changes every sample of a topic on its way, in a test.
+#[cfg(test)]
+pub type Forge<M> = Box<dyn FnMut(Nanos, &mut M) + Send>;
+
+/// A topic with one publisher and its readers.
+pub struct Topic<M: Message> {
     epoch: u64,
     sequence: u64,
-    admission: Admission<M>,
-    newest: Option<M>,
+    readers: Vec<Reader<M>>,
+    passing: Vec<Passing<M>>,
+    #[cfg(test)]
+    forge: Option<Forge<M>>,
 }
 
-impl<M: Message> Channel<M> {
-    /// A topic whose publisher began at `epoch`.
-    pub fn new(epoch: Nanos) -> Self {
-        Self { epoch, sequence: 0, admission: Admission::default(), newest: None }
+impl<M: Message> Topic<M> {
+    /// A topic whose publisher began at `epoch`, read by `readers`.
+    pub fn new(epoch: Nanos, readers: &[Process]) -> Self {
+        Self {
+            epoch,
+            sequence: 0,
+            readers: readers.iter().map(|process| Reader::new(*process)).collect(),
+            passing: Vec::new(),
+            #[cfg(test)]
+            forge: None,
+        }
     }
 
     /// The publisher starts anew.
@@ -24,22 +43,137 @@ impl<M: Message> Channel<M> {
         (self.epoch, self.sequence) = (epoch, 0);
     }
 
-    /// Lets `fill` write a sample; it is sealed at `now`, checked as a receiver would, and kept as the newest.
-    pub fn send(&mut self, now: Nanos, fill: impl FnOnce(&mut M) -> bool) -> Option<(M, Admitted)> {
+    /// The reader's process starts anew: what waited for its earlier life is gone.
+    pub fn reopen(&mut self, reader: Process) {
+        if let Some(found) = self.readers.iter_mut().find(|known| known.process == reader) {
+            *found = Reader::new(reader);
+        }
+    }
+
+    /// Every sample is changed on its way from now on, as by a publisher with a defect: the seal is right.
+    #[cfg(test)]
+    pub fn forge(&mut self, forge: Forge<M>) {
+        self.forge = Some(forge);
+    }
+
+    /// What is on its way to `reader` (all of them where that is none) meets with `mishap` until `until`.
+    pub fn befall(&mut self, mishap: Mishap, reader: Option<Process>, until: Nanos) {
+        for known in &self.readers {
+            if reader.is_none_or(|reader| reader == known.process) {
+                self.passing.push(Passing::new(mishap, known.process, until));
+            }
+        }
+    }
+
+    /// Lets `fill` write a sample; it is sealed at `now`, and on its way.
+    pub fn send(&mut self, now: Nanos, fill: impl FnOnce(&mut M) -> bool) -> Option<M> {
         let mut message = M::default();
         if !fill(&mut message) {
             return None;
         }
+        #[cfg(test)]
+        if let Some(forge) = &mut self.forge {
+            forge(now, &mut message);
+        }
         self.sequence += 1;
         seal(&mut message, &[], self.epoch, self.sequence, now);
-        let admitted = self.admission.admit(&message, &[], now).ok()?;
-        self.newest = Some(message);
-        Some((message, admitted))
+        self.deliver(now, &message);
+        Some(message)
     }
 
-    /// The newest sample.
-    pub fn newest(&self) -> Option<&M> {
-        self.newest.as_ref()
+    fn deliver(&mut self, now: Nanos, message: &M) {
+        if !self.passing.is_empty() {
+            self.passing.retain(|passing| passing.until > now);
+        }
+        for reader in &mut self.readers {
+            let concerned =
+                self.passing.iter_mut().find(|passing| passing.reader == reader.process);
+            match concerned {
+                Some(passing) => passing.pass(now, message, |due, sample| reader.put(due, sample)),
+                None => reader.put(now, message),
+            }
+        }
+    }
+
+    /// The reader's end of the topic.
+    pub fn reader(&mut self, process: Process) -> Option<&mut Reader<M>> {
+        self.readers.iter_mut().find(|reader| reader.process == process)
+    }
+
+    /// The next sample for a reader of every one.
+    pub fn take(&mut self, process: Process, now: Nanos) -> Option<(M, Admitted)> {
+        self.reader(process)?.take(now)
+    }
+
+    /// Lets a reader of the newest take in what came; whether something did.
+    pub fn update(&mut self, process: Process, now: Nanos) -> bool {
+        self.reader(process).is_some_and(|reader| reader.update(now))
+    }
+
+    /// The newest sample that a reader has taken in.
+    pub fn newest(&self, process: Process) -> Option<&M> {
+        self.readers.iter().find(|reader| reader.process == process)?.newest.as_ref()
+    }
+
+    /// What a reader refused.
+    pub fn refusals(&self, process: Process) -> u64 {
+        let reader = self.readers.iter().find(|reader| reader.process == process);
+        reader.map_or(0, |reader| reader.counts().total())
+    }
+}
+
+/// A reader's end of a topic.
+#[derive(Debug)]
+pub struct Reader<M: Message> {
+    process: Process,
+    admission: Admission<M>,
+    queue: VecDeque<(Nanos, M)>,
+    newest: Option<M>,
+}
+
+impl<M: Message> Reader<M> {
+    fn new(process: Process) -> Self {
+        Self { process, admission: Admission::default(), queue: VecDeque::new(), newest: None }
+    }
+
+    fn put(&mut self, due: Nanos, message: &M) {
+        let in_order = matches!(M::TOPIC.delivery, kerbside_messages::Delivery::InOrder { .. });
+        let depth = if in_order { IN_ORDER } else { NEWEST };
+        if self.queue.len() >= depth {
+            self.queue.pop_front();
+        }
+        self.queue.push_back((due, *message));
+    }
+
+    /// The next sample that has come and may be used.
+    fn take(&mut self, now: Nanos) -> Option<(M, Admitted)> {
+        loop {
+            let message = self.arrived(now)?;
+            if let Ok(admitted) = self.admission.admit(&message, &[], now) {
+                return Some((message, admitted));
+            }
+        }
+    }
+
+    /// The next sample that has come: what is late lets others pass.
+    fn arrived(&mut self, now: Nanos) -> Option<M> {
+        let due = |(due, _): &(Nanos, M)| *due;
+        let first = self.queue.iter().map(due).min().filter(|first| *first <= now)?;
+        let index = self.queue.iter().position(|waiting| waiting.0 == first)?;
+        self.queue.remove(index).map(|(_, message)| message)
+    }
+
+    fn update(&mut self, now: Nanos) -> bool {
+        let mut came = false;
+        while let Some((message, _)) = self.take(now) {
+            self.newest = Some(message);
+            came = true;
+        }
+        came
+    }
+
+    fn counts(&self) -> &Refusals {
+        self.admission.counts()
     }
 }
 
@@ -47,18 +181,22 @@ impl<M: Message> Channel<M> {
 #[derive(Debug, Default)]
 pub struct ByteQueue {
     delay: Nanos,
+    room: usize,
     pieces: VecDeque<(Nanos, usize)>,
     bytes: VecDeque<u8>,
 }
 
 impl ByteQueue {
-    /// A line that takes `delay`.
-    pub fn new(delay: Nanos) -> Self {
-        Self { delay, ..Self::default() }
+    /// A line that takes `delay` and holds `room` bytes; what it has no room for is lost.
+    pub fn new(delay: Nanos, room: usize) -> Self {
+        Self { delay, room, ..Self::default() }
     }
 
     /// Puts bytes in at `now`.
     pub fn put(&mut self, now: Nanos, bytes: &[u8]) {
+        if self.bytes.len() + bytes.len() > self.room {
+            return;
+        }
         self.pieces.push_back((now + self.delay, bytes.len()));
         self.bytes.extend(bytes);
     }

@@ -2,6 +2,18 @@
 //! supervisor and gate. What is not in it: iceoryx2, the terminal, the disk. The same seed gives the same bits.
 
 mod channel;
+mod check;
+mod draw;
+mod drive;
+mod mishap;
+mod schedule;
+mod shrink;
 mod world;
 
-pub use world::{LineFault, Script, World, words_of};
+pub use check::{Broken, Checker, Invariant, Stop};
+pub use draw::draw;
+pub use drive::{Searching, Task, Watcher, drive};
+pub use mishap::Mishap;
+pub use schedule::{Fault, Kind, LineMishap, Schedule, Way, Wire};
+pub use shrink::shrink;
+pub use world::{Plans, World, words_of};

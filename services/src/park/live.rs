@@ -77,15 +77,10 @@ fn operate(
     let mut look = Ticker::new(LOOK);
     loop {
         desk.take_in(trace);
-        let armed = desk.armed.as_mut().and_then(Pending::poll);
-        let planned = desk.planned.as_mut().and_then(Pending::poll);
-        if planned.is_some() {
-            // The plan was sent before its answer.
-            desk.take_plan(trace);
-        }
+        let (armed, planned) = desk.answers(trace);
         let seen = Observation {
-            state: desk.state.get(),
-            odometry: desk.newest_odometry.as_ref(),
+            state: desk.state(),
+            odometry: desk.odometry(),
             armed: armed.as_ref(),
             planned: planned.as_ref(),
             vehicle_lost: stack.vehicle_ended(),
@@ -96,7 +91,9 @@ fn operate(
         if let Act::End(end) = act {
             return end;
         }
-        if let Err(error) = desk.act(act, job, start) {
+        let fix = || start.fix(now());
+        let request = || job.scenario.plan_request(&job.service.vehicle);
+        if let Err(error) = desk.act(act, fix, request) {
             tracing::warn!(%error, "operator's message lost; it will be sent again");
         }
         progress.show(manoeuvre.phase(), trace);
@@ -116,7 +113,7 @@ fn watch_stop(desk: &mut Desk, trace: &mut Trace) {
 }
 
 /// The operator's ports.
-struct Desk {
+pub struct Desk {
     odometry: Subscriber<Odometry>,
     newest_odometry: Option<Odometry>,
     truth: Subscriber<Truth>,
@@ -134,7 +131,11 @@ struct Desk {
 }
 
 impl Desk {
-    fn open(session: &Session, job: &Job) -> Result<Self, SessionError> {
+    /// Opens them.
+    ///
+    /// # Errors
+    /// Where the middleware refuses.
+    pub fn open(session: &Session, job: &Job) -> Result<Self, SessionError> {
         let beats = |process| session.subscriber::<Heartbeat>(Some(process), 16);
         Ok(Self {
             odometry: session.subscriber(None, 512)?,
@@ -159,7 +160,49 @@ impl Desk {
         })
     }
 
-    fn take_in(&mut self, trace: &mut Trace) {
+    /// The newest state.
+    #[must_use]
+    pub fn state(&self) -> Option<&State> {
+        self.state.get()
+    }
+
+    /// The newest estimate.
+    #[must_use]
+    pub fn odometry(&self) -> Option<&Odometry> {
+        self.newest_odometry.as_ref()
+    }
+
+    /// Answers that came since the last look: to an arm, and to a plan request, whose plan `trace` takes in.
+    pub fn answers(&mut self, trace: &mut Trace) -> (Option<OperatorAnswer>, Option<PlanAnswer>) {
+        let armed = self.armed.as_mut().and_then(Pending::poll);
+        let planned = self.planned.as_mut().and_then(Pending::poll);
+        if planned.is_some() {
+            // The plan was sent before its answer.
+            self.take_plan(trace);
+        }
+        (armed, planned)
+    }
+
+    /// Asks the supervisor.
+    ///
+    /// # Errors
+    /// Where the middleware refuses.
+    pub fn ask(
+        &mut self,
+        verb: Verb,
+    ) -> Result<Pending<OperatorRequest, OperatorAnswer>, kerbside_runtime::RuntimeError> {
+        self.requests += 1;
+        let request = OperatorRequest {
+            id: self.requests,
+            pid: std::process::id(),
+            verb: verb.code(),
+            ..OperatorRequest::default()
+        };
+        self.operator.send(request)
+    }
+
+    /// Takes in what came since the last look.
+    pub fn take_in(&mut self, trace: &mut Trace) {
         while let Some(odometry) = self.odometry.receive() {
             trace.odometry.push(*odometry);
             self.newest_odometry = Some(*odometry);
@@ -194,34 +237,29 @@ impl Desk {
         }
     }
 
-    fn act(
+    /// Does what the operator decided; `fix` says where the vehicle stands, `request` where it is to go.
+    ///
+    /// # Errors
+    /// Where the middleware refuses.
+    pub fn act(
         &mut self,
         act: Act,
-        job: &Job,
-        start: &Start,
+        fix: impl FnOnce() -> Fix,
+        request: impl FnOnce() -> PlanRequest,
     ) -> Result<(), kerbside_runtime::RuntimeError> {
         match act {
             Act::Watch | Act::End(_) => {}
             Act::Fix => {
-                let content = start.fix(now());
+                let content = fix();
                 self.fix.send(|fix| {
                     *fix = content;
                     true
                 })?;
             }
-            Act::Arm => {
-                self.requests += 1;
-                let request = OperatorRequest {
-                    id: self.requests,
-                    pid: std::process::id(),
-                    verb: Verb::Arm.code(),
-                    ..OperatorRequest::default()
-                };
-                self.armed = Some(self.operator.send(request)?);
-            }
+            Act::Arm => self.armed = Some(self.ask(Verb::Arm)?),
             Act::Plan { arm } => {
                 self.requests += 1;
-                let mut request = job.scenario.plan_request(&job.service.vehicle);
+                let mut request = request();
                 (request.id, request.arm) = (self.requests, arm);
                 debug_assert!(request.header().version == 0, "sealed by the client");
                 self.planned = Some(self.planner.send(request)?);

@@ -1,10 +1,10 @@
 //! `park`: the main job. Runs a scenario, live or in lockstep, judges it, and tells.
 
 pub mod judge;
-mod live;
+pub mod live;
 mod progress;
 mod report;
-mod scene;
+pub mod scene;
 pub mod simulated;
 mod summary;
 pub mod trace;
@@ -17,7 +17,7 @@ use kerbside_runtime::Instance;
 use kerbside_settings::Scenario;
 
 use crate::exit::{Exit, Failure};
-use crate::lockstep::Script;
+use crate::lockstep::Schedule;
 use crate::manoeuvre::End;
 use crate::service::{Service, ServiceArgs};
 use crate::vehicle::{Plant, PlantArgs};
@@ -159,7 +159,7 @@ fn run_one(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Finished, Failur
     // Only now, so that what is refused leaves no folder behind.
     output::make(folder)?;
     let run = if job.lockstep {
-        simulated::run(&job, Script::default())?
+        simulated::run(&job, Schedule::default())?
     } else {
         let progress = Progress::new(args.headless);
         progress.say(&format!("instance {}", job.service.instance.name()));

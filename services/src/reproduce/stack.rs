@@ -5,7 +5,7 @@ use std::path::Path;
 use kerbside_reports::StackParking;
 
 use crate::exit::Failure;
-use crate::lockstep::Script;
+use crate::lockstep::Schedule;
 use crate::output;
 use crate::park::{self, ParkArgs};
 use crate::vehicle::PlantArgs;
@@ -68,7 +68,7 @@ fn one_scene(
             folder.join(format!("{scene}-{}-{seed}", if lockstep { "lockstep" } else { "live" }));
         let job = park::job(&args, seed, &folder)?;
         let run = if lockstep {
-            park::simulated::run(&job, Script::default())?
+            park::simulated::run(&job, Schedule::default())?
         } else {
             output::make(&folder)?;
             park::run_live(&job)?

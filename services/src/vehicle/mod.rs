@@ -25,7 +25,7 @@ use pty::Pty;
 use reporter::Reporter;
 
 /// A pause of the process longer than this stops the vehicle's time: it was stopped, not late \[ns\].
-const PAUSE: Nanos = 250_000_000;
+pub(crate) const PAUSE: Nanos = 250_000_000;
 
 /// A vehicle that belongs to a stack ends once there was no supervisor for so long \[ns\].
 const ABANDONED: Nanos = 60_000_000_000;

@@ -33,6 +33,14 @@ pub struct Plant {
     pub files: Vec<String>,
 }
 
+impl Plant {
+    /// The vehicle as the stack of `service` takes it to be.
+    #[must_use]
+    pub fn as_described(service: &Service) -> Self {
+        Self { vehicle: service.vehicle.clone(), effects: Effects::default(), files: Vec::new() }
+    }
+}
+
 impl PlantArgs {
     /// Whether anything is asked for.
     #[must_use]

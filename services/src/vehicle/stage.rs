@@ -33,6 +33,11 @@ pub struct VehicleStage {
     period: Nanos,
     time: Nanos,
     silent: bool,
+    hello: Hello,
+    /// Counts at which the counters were set to zero.
+    zero: [i64; 4],
+    /// What the board's clock shows besides the time since the start \[ns\].
+    clock: i64,
 }
 
 impl VehicleStage {
@@ -45,7 +50,41 @@ impl VehicleStage {
             Simulator::with_effects(vehicle, effects, making.start, &noise, making.seed);
         let period = period_of(&making.vehicle);
         let hello = hello_of(making, &simulator.reading(), period);
-        Self { end: VehicleEnd::new(hello), simulator, period, time: 0, silent: true }
+        Self {
+            end: VehicleEnd::new(hello),
+            simulator,
+            period,
+            time: 0,
+            silent: true,
+            hello,
+            zero: [0; 4],
+            clock: 0,
+        }
+    }
+
+    /// The board starts anew as `boot`: counters and clock begin at zero, and nothing moves until a host commands it.
+    pub fn reboot(&mut self, boot: u32) {
+        self.hello = Hello { boot, ..self.hello };
+        self.end = VehicleEnd::new(self.hello);
+        self.reset_counters();
+        self.clock = -self.time.cast_signed();
+    }
+
+    /// The counters are set to zero, and nothing says so.
+    pub fn reset_counters(&mut self) {
+        self.zero = self.simulator.reading().counts;
+    }
+
+    /// The clock that readings are stamped by jumps by `by` \[ns\], not below zero.
+    pub fn step_clock(&mut self, by: i64) {
+        self.clock += by;
+    }
+
+    /// Another silence time-out \[ms\].
+    #[cfg(test)]
+    pub(crate) fn set_silence(&mut self, silence: u16) {
+        self.hello.silence_ms = silence;
+        self.end = VehicleEnd::new(self.hello);
     }
 
     /// Time between readings \[ns\].
@@ -77,8 +116,12 @@ impl VehicleStage {
         while let Some(frame) = self.end.pending(time) {
             write(&frame);
         }
-        let reading = self.simulator.reading();
-        write(&self.end.reading(&sensors_of(time, &reading)));
+        let mut reading = self.simulator.reading();
+        for (count, zero) in reading.counts.iter_mut().zip(self.zero) {
+            *count = count.wrapping_sub(zero);
+        }
+        let shown = time.saturating_add_signed(self.clock);
+        write(&self.end.reading_at(time, &sensors_of(shown, &reading)));
     }
 
     /// The true state, at the host's time `now`.

@@ -9,8 +9,8 @@
 //! - [`svg`]: figures. A [`svg::Map`] in metres with equal scales, a [`svg::Chart`] of traces over
 //!   a common axis, [`svg::latency_histogram`] and [`svg::latency_tail`] on logarithmic axes.
 //! - [`page`]: what a page is made of: a verdict, sections, key figures, tables, facts, figures.
-//! - [`ParkReport`], [`ReplayReport`], [`CalibrateReport`], [`DiagnoseReport`] and [`ReproductionReport`]: plain
-//!   data in, a page out.
+//! - [`ParkReport`], [`ReplayReport`], [`CalibrateReport`], [`DiagnoseReport`], [`ReproductionReport`] and
+//!   [`SoakReport`]: plain data in, a page out.
 //!
 //! Lengths are metres, angles radians, times seconds since the run's start, unless a name says
 //! else. Figures that are not finite are shown as a dash; they never reach the drawing.
@@ -24,6 +24,7 @@ mod park;
 mod provenance;
 mod replay;
 mod reproduce;
+mod soak;
 pub mod svg;
 mod track;
 
@@ -40,4 +41,5 @@ pub use park::{
 pub use provenance::Provenance;
 pub use replay::{Drift, Gap, Model, RefusalCount, ReplayReport, WheelTravel};
 pub use reproduce::{ReproductionReport, StackParking};
+pub use soak::{SoakFault, SoakFigure, SoakReport, SoakSlope};
 pub use track::Motion;

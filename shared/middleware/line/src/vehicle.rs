@@ -94,11 +94,16 @@ impl VehicleEnd {
     /// The next reading. It carries what was declared in the HELLO of what `sensors` has, and no
     /// number that is not finite; counters are cut to their width.
     pub fn reading(&mut self, sensors: &Sensors) -> Frame {
+        self.reading_at(sensors.time, sensors)
+    }
+
+    /// The same at `now`, of sensors that are stamped by a clock of their own.
+    pub fn reading_at(&mut self, now: u64, sensors: &Sensors) -> Frame {
         let reading = Reading {
             boot: self.link.hello.boot,
             sequence: self.sequence,
             acknowledged: self.link.accepted,
-            silent: self.is_silent(sensors.time),
+            silent: self.is_silent(now),
             sensors: sensors.declared(&self.link.hello),
         };
         self.sequence = self.sequence.wrapping_add(1);

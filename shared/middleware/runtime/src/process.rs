@@ -30,6 +30,11 @@ pub fn kill(pid: u32) {
     signal(pid, Signal::KILL);
 }
 
+/// Stops a process where it is; [`resume`] lets it go on.
+pub fn suspend(pid: u32) {
+    signal(pid, Signal::STOP);
+}
+
 /// Lets a stopped process go on, so that it hears what it was asked.
 pub fn resume(pid: u32) {
     signal(pid, Signal::CONT);

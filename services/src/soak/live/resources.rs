@@ -1,0 +1,259 @@
+//! Memory, descriptors and shared-memory segments over time, and whether one of them grows.
+
+use std::collections::BTreeMap;
+use std::fs;
+
+use kerbside_messages::{Nanos, seconds};
+use kerbside_runtime::Instance;
+
+/// A life's first seconds are left out: a process that starts grows \[s\].
+const WARM_UP: f64 = 30.0;
+/// Samples are averaged over so long before the fit: neighbours are not independent \[s\].
+const BLOCK: f64 = 10.0;
+/// Fewer blocks tell no slope.
+const BLOCKS: usize = 9;
+/// Bytes of a page.
+const PAGE: f64 = 4096.0;
+
+/// What may leak.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Resource {
+    /// Resident memory \[KiB\].
+    Memory,
+    /// Open descriptors.
+    Descriptors,
+    /// Segments in shared memory, of the whole instance.
+    Segments,
+}
+
+impl Resource {
+    /// Name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Memory => "memory [KiB]",
+            Self::Descriptors => "descriptors",
+            Self::Segments => "segments",
+        }
+    }
+
+    /// A slope below this is none \[per minute\].
+    #[must_use]
+    pub const fn flat(self) -> f64 {
+        match self {
+            Self::Memory => 1.0,
+            Self::Descriptors | Self::Segments => 0.05,
+        }
+    }
+}
+
+/// How fast something grows \[per minute\], with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slope {
+    /// Most likely.
+    pub value: f64,
+    /// At least.
+    pub low: f64,
+    /// At most.
+    pub high: f64,
+}
+
+impl Slope {
+    /// Whether it grows: the interval lies above zero, and the slope is worth a word.
+    #[must_use]
+    pub fn leaks(&self, resource: Resource) -> bool {
+        self.low > 0.0 && self.value >= resource.flat()
+    }
+}
+
+/// A value at a time, of a life of its process.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// The life.
+    pub pid: u32,
+    /// When \[s since the soak's beginning\].
+    pub at: f64,
+    /// How much.
+    pub value: f64,
+}
+
+/// Everything that was sampled.
+#[derive(Debug)]
+pub struct Resources {
+    began: Nanos,
+    born: BTreeMap<u32, f64>,
+    samples: BTreeMap<(String, Resource), Vec<Sample>>,
+}
+
+impl Resources {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new(began: Nanos) -> Self {
+        Self { began, born: BTreeMap::new(), samples: BTreeMap::new() }
+    }
+
+    /// Looks at every process, as (name, pid), and at the instance.
+    pub fn look(&mut self, now: Nanos, processes: &[(String, u32)], instance: &Instance) {
+        let at = seconds(now.saturating_sub(self.began));
+        for (name, pid) in processes.iter().filter(|(_, pid)| *pid > 0) {
+            let born = *self.born.entry(*pid).or_insert(at);
+            if at - born < WARM_UP {
+                continue;
+            }
+            self.note(name, Resource::Memory, *pid, at, memory(*pid));
+            self.note(name, Resource::Descriptors, *pid, at, descriptors(*pid));
+        }
+        if at >= WARM_UP {
+            self.note("instance", Resource::Segments, 0, at, segments(instance));
+        }
+    }
+
+    fn note(&mut self, name: &str, resource: Resource, pid: u32, at: f64, value: Option<f64>) {
+        if let Some(value) = value {
+            let samples = self.samples.entry((name.to_owned(), resource)).or_default();
+            samples.push(Sample { pid, at, value });
+        }
+    }
+
+    /// Of each process and resource its slope; none where there was too little to tell.
+    #[must_use]
+    pub fn slopes(&self) -> Vec<(String, Resource, Option<Slope>)> {
+        let each = |((name, resource), samples): (&(String, Resource), &Vec<Sample>)| {
+            (name.clone(), *resource, slope(samples))
+        };
+        self.samples.iter().map(each).collect()
+    }
+
+    /// What was sampled, by process and resource.
+    #[must_use]
+    pub fn samples(&self) -> &BTreeMap<(String, Resource), Vec<Sample>> {
+        &self.samples
+    }
+}
+
+/// The common slope of all lives, each with a level of its own (ordinary least squares on means of blocks).
+#[must_use]
+pub fn slope(samples: &[Sample]) -> Option<Slope> {
+    let lives = blocks(samples);
+    let (mut xx, mut xy, mut yy, mut count, mut levels) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for life in lives.iter().filter(|life| life.len() > 1) {
+        #[allow(clippy::cast_precision_loss)] // blocks of a life
+        let size = life.len() as f64;
+        let mean = |of: fn(&(f64, f64)) -> f64| life.iter().map(of).sum::<f64>() / size;
+        let (x, y) = (mean(|point| point.0), mean(|point| point.1));
+        for point in life {
+            xx += (point.0 - x) * (point.0 - x);
+            xy += (point.0 - x) * (point.1 - y);
+            yy += (point.1 - y) * (point.1 - y);
+        }
+        count += size;
+        levels += 1.0;
+    }
+    #[allow(clippy::cast_precision_loss)] // blocks
+    if count < BLOCKS as f64 || xx <= 0.0 {
+        return None;
+    }
+    let value = xy / xx;
+    let freedom = (count - levels - 1.0).max(1.0);
+    let spread = 1.96 * ((yy - value * xy).max(0.0) / freedom / xx).sqrt();
+    Some(Slope { value, low: value - spread, high: value + spread })
+}
+
+/// Means of blocks as (minute, value), by life.
+fn blocks(samples: &[Sample]) -> Vec<Vec<(f64, f64)>> {
+    let mut sums: BTreeMap<(u32, u64), (f64, f64, f64)> = BTreeMap::new();
+    for sample in samples {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // seconds of a soak
+        let block = (sample.at / BLOCK) as u64;
+        let sum = sums.entry((sample.pid, block)).or_default();
+        *sum = (sum.0 + sample.at / 60.0, sum.1 + sample.value, sum.2 + 1.0);
+    }
+    let mut lives: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
+    for ((pid, _), (at, value, count)) in sums {
+        lives.entry(pid).or_default().push((at / count, value / count));
+    }
+    lives.into_values().collect()
+}
+
+fn memory(pid: u32) -> Option<f64> {
+    let text = fs::read_to_string(format!("/proc/{pid}/statm")).ok()?;
+    let pages: f64 = text.split_whitespace().nth(1)?.parse().ok()?;
+    Some(pages * PAGE / 1024.0)
+}
+
+#[allow(clippy::cast_precision_loss)] // descriptors
+fn descriptors(pid: u32) -> Option<f64> {
+    Some(fs::read_dir(format!("/proc/{pid}/fd")).ok()?.count() as f64)
+}
+
+/// Segments of the instance in shared memory.
+#[allow(clippy::cast_precision_loss)] // segments
+fn segments(instance: &Instance) -> Option<f64> {
+    Some(segments_of(instance).len() as f64)
+}
+
+/// Names of the instance's segments in shared memory.
+#[must_use]
+pub fn segments_of(instance: &Instance) -> Vec<String> {
+    let prefix = instance.prefix();
+    let names = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.filter(|name| name.starts_with(&prefix)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn samples(lives: u32, value: impl Fn(u32, f64) -> f64) -> Vec<Sample> {
+        let of_life = |pid: u32| {
+            let begin = f64::from(pid) * 200.0;
+            (0..180_u32).map(move |second| (pid, begin + f64::from(second)))
+        };
+        (0..lives)
+            .flat_map(of_life)
+            .map(|(pid, at)| Sample { pid, at, value: value(pid, at) })
+            .collect()
+    }
+
+    /// Something that looks like noise: at most half in either direction.
+    fn wobble(at: f64) -> f64 {
+        (at * 0.731).fract() - 0.5
+    }
+
+    #[test]
+    fn a_leak_is_found_through_restarts_and_level_changes_are_none() {
+        // Each life begins at another level; within each 3 KiB a minute are added.
+        let leaking = samples(3, |pid, at| {
+            5_000.0
+                + 700.0 * f64::from(pid)
+                + 3.0 * (at - 200.0 * f64::from(pid)) / 60.0
+                + wobble(at)
+        });
+        let slope = slope(&leaking).unwrap();
+        assert!((slope.value - 3.0).abs() < 0.3, "{slope:?}");
+        assert!(slope.low < slope.value && slope.value < slope.high);
+        assert!(slope.leaks(Resource::Memory));
+    }
+
+    #[test]
+    fn what_is_flat_does_not_leak() {
+        let flat = samples(3, |pid, at| 5_000.0 + 700.0 * f64::from(pid) + 20.0 * wobble(at));
+        let slope = slope(&flat).unwrap();
+        assert!(!slope.leaks(Resource::Memory), "{slope:?}");
+        assert!(slope.low < 0.0 && slope.high > 0.0);
+    }
+
+    #[test]
+    fn too_little_tells_nothing() {
+        assert_eq!(slope(&samples(1, |_, at| at)[..60]), None);
+        assert_eq!(slope(&[]), None);
+    }
+
+    #[test]
+    fn this_very_process_has_memory_and_descriptors() {
+        let pid = std::process::id();
+        assert!(memory(pid).unwrap() > 100.0 && descriptors(pid).unwrap() >= 3.0);
+        assert_eq!(memory(u32::MAX), None);
+    }
+}
