@@ -41,7 +41,7 @@ impl Task<'_> {
     pub fn world(&self, schedule: Schedule) -> Result<World, Failure> {
         let making = Making {
             vehicle: self.plant.vehicle.clone(),
-            effects: self.plant.effects.clone(),
+            effects: self.plant.effects,
             start: self.start.truth,
             seed: self.seed,
             boot: 1,

@@ -15,20 +15,11 @@ use crate::manoeuvre::End;
 /// [`Failure`] where the vehicle has nothing to compute motion from.
 pub fn run(job: &Job, schedule: Schedule) -> Result<Run, Failure> {
     let begun = kerbside_runtime::now();
-<<<<<<< ours
     let task = Task {
         service: &job.service,
         scenario: &job.scenario,
         start: &Start::draw(&job.scenario, job.seed),
         plant: &job.plant,
-=======
-    let scenario = &job.scenario;
-    let start = Start::draw(scenario, job.seed);
-    let making = Making {
-        vehicle: job.plant.vehicle.clone(),
-        effects: job.plant.effects,
-        start: start.truth,
->>>>>>> theirs
         seed: job.seed,
         rearm: job.rearm,
     };

@@ -94,10 +94,10 @@ pub struct Field {
 }
 
 impl Field {
-    /// Whether it holds text: UTF-8, filled up with zeros, as its documentation says.
+    /// Whether it holds text: UTF-8, filled up with zeros.
     #[must_use]
-    pub fn is_text(&self) -> bool {
-        self.kind == Kind::U8 && self.count.is_some() && self.doc.contains("UTF-8")
+    pub const fn is_text(&self) -> bool {
+        matches!(self.meaning, Meaning::Text)
     }
 
     /// Whether nothing is in it: it fills a gap that the compiler would leave.

@@ -49,9 +49,10 @@ impl Census {
         Self { publishers: self.subscribers, subscribers: self.publishers }
     }
 
-    /// Subscribers that the line of the table does not name.
+    /// Subscribers that the line of the table does not name; the gateway reads every topic and is no guest.
     pub fn guests(&self, topic: &Topic) -> impl Iterator<Item = &Participant> {
-        let expected = |process: Process| topic.subscribers.contains(&process);
+        let expected =
+            |process| topic.subscribers.contains(&process) || process == Process::Gateway;
         self.subscribers.iter().filter(move |one| !one.process.is_some_and(expected))
     }
 }

@@ -55,8 +55,8 @@ fn guests_come_until_their_places_are_taken(session: &Session) -> Vec<impl Sized
 }
 
 fn processes_still_find_a_place(session: &Session) {
-    // Those of the table, and two whose predecessors are not swept yet.
-    let places = RAW.subscribers.len() + 2;
+    // Those of the table, the gateway, and two whose predecessors are not swept yet.
+    let places = RAW.subscribers.len() + 3;
     let own: Vec<_> = (0..places).map(|_| session.subscriber::<Raw>(None, 1).unwrap()).collect();
     let refused = session.subscriber::<Raw>(None, 1).unwrap_err().to_string();
     let all = places + GUESTS;
