@@ -7,7 +7,7 @@ use crate::{Nanos, Refusal};
 /// The version of the layouts, for names that are put together when they are compiled.
 macro_rules! layout_version {
     () => {
-        3
+        4
     };
 }
 
