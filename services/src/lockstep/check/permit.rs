@@ -49,6 +49,8 @@ pub(super) struct PermitWatch {
     delivered: f64,
     /// Since when the vehicle stands \[ns\].
     stands: Option<Nanos>,
+    /// Since when it is to stand \[ns\].
+    stopped: Option<Nanos>,
     /// The arm under which the vehicle came to rest after its permit had ended, or after it had stopped by itself.
     rested: Option<u64>,
     /// The arm under which the vehicle stopped by itself, for silence.
@@ -64,6 +66,7 @@ impl PermitWatch {
             output: None,
             delivered: 0.0,
             stands: None,
+            stopped: None,
             rested: None,
             silenced: None,
         }
@@ -176,7 +179,9 @@ impl PermitWatch {
         }
         self.stands = if speed < REST { self.stands.or(Some(now)) } else { None };
         let stopped = !live || self.silenced == Some(arm);
-        if stopped && self.stands.is_some_and(|since| now - since >= EFFECT) {
+        self.stopped = if stopped { self.stopped.or(Some(now)) } else { None };
+        let long = |since: Nanos| now - since >= EFFECT;
+        if self.stopped.is_some_and(long) && self.stands.is_some_and(long) {
             self.rested = Some(arm);
         }
         if self.rested.is_some() && speed > MOVES {
