@@ -244,7 +244,8 @@ fn clients_that_do_harm_cost_themselves() {
         assert!(stalled.join().unwrap(), "a client that takes nothing stays");
         let (closed, words) = endless.join().unwrap();
         assert!(closed && words.contains("gateway.line_length"), "{words}");
-        (rubbish.join().unwrap(), vanishing.join().unwrap());
+        rubbish.join().unwrap();
+        vanishing.join().unwrap();
         going.join().unwrap();
         let seen = status(&sandbox).unwrap();
         let gateway = row(&seen, "gateway");

@@ -293,7 +293,7 @@ fn a_vehicle_file_that_absorbs_the_effects_brings_the_parking_back() {
     let back = [&with[..], &["--plant", "paper-1-6", "--vehicle", &believed]].concat();
     let mean = |words: &[&str]| {
         let error = |seed| {
-            let error = drive(words, seed, Script::default()).1.end_error.unwrap();
+            let error = drive(words, seed, Schedule::default()).1.end_error.unwrap();
             error.x.hypot(error.y)
         };
         (1..=5).map(error).sum::<f64>() / 5.0

@@ -99,7 +99,6 @@ impl Complaint {
 }
 
 /// A line: the id that the reply repeats, null where there is none, and the request, or what is wrong with it.
-#[must_use]
 pub fn parse(
     line: &[u8],
     now: Nanos,

@@ -11,7 +11,7 @@ mod shrink;
 mod world;
 
 pub use check::{Broken, Checker, Invariant, Stop};
-pub use draw::draw;
+pub use draw::{VICTIMS, draw};
 pub use drive::{Searching, Task, Watcher, drive};
 pub use mishap::Mishap;
 pub use schedule::{Fault, Kind, LineMishap, Schedule, Way, Wire};

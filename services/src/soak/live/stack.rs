@@ -15,9 +15,11 @@ use super::super::SoakArgs;
 use super::flight::{Allowed, Course, Flight};
 use crate::children::Children;
 use crate::exit::Failure;
+use crate::lockstep::VICTIMS;
 use crate::park::live::Desk;
 use crate::park::{self, Job, ParkArgs};
 use crate::vehicle::format_pose;
+use crate::vehicle::plant::PlantArgs;
 
 /// A vehicle without a supervisor stands if it has not moved for so long \[ns\].
 const STANDS: Nanos = 200_000_000;
@@ -34,7 +36,7 @@ pub fn job(args: &SoakArgs, folder: &Path) -> Result<Job, Failure> {
         runs: 1,
         rearm: true,
         vehicle: None,
-        effects: None,
+        plant: PlantArgs::default(),
         config: args.config.clone(),
         instance: Some(args.instance.clone().unwrap_or_else(|| Instance::fresh_name("soak"))),
         out: None,
@@ -150,7 +152,7 @@ impl Stack {
     #[must_use]
     pub fn processes(&self, state: Option<&State>) -> Vec<(String, u32)> {
         let Some(state) = state else { return Vec::new() };
-        let mut all: Vec<(String, u32)> = Process::SUPERVISED
+        let mut all: Vec<(String, u32)> = VICTIMS
             .into_iter()
             .map(|process| (process.name().to_owned(), self.pid(process, state)))
             .collect();

@@ -7,6 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::super::Faults;
+use crate::lockstep::VICTIMS;
 
 const MS: Nanos = 1_000_000;
 /// Pauses between two faults \[ns\].
@@ -164,13 +165,13 @@ impl Random {
         let drawn = match self.random.random_range(0..40) {
             0 => Process::Supervisor,
             1 => Process::Vehicle,
-            other => Process::SUPERVISED[other % Process::SUPERVISED.len()],
+            other => VICTIMS[other % VICTIMS.len()],
         };
         let often = |process| self.struck.iter().filter(|(_, hit)| *hit == process).count();
         if often(drawn) < OFTEN {
             return drawn;
         }
-        Process::SUPERVISED.into_iter().min_by_key(|process| often(*process)).unwrap_or(drawn)
+        VICTIMS.into_iter().min_by_key(|process| often(*process)).unwrap_or(drawn)
     }
 
     fn blow(&mut self) -> Blow {
@@ -213,7 +214,7 @@ impl Matrix {
     /// The whole matrix.
     #[must_use]
     pub fn whole() -> Self {
-        let mut processes = Process::SUPERVISED.to_vec();
+        let mut processes = VICTIMS.to_vec();
         processes.push(Process::Supervisor);
         let aims = MODES.into_iter().flat_map(|mode| {
             processes.clone().into_iter().flat_map(move |process| {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use crate::vehicle::plant::Plant;
+use crate::vehicle::plant::{Plant, PlantArgs};
 use kerbside_messages::{Nanos, Odometry, PlanRequest};
 
 use crate::exit::Failure;
@@ -69,7 +69,7 @@ fn job_of(scene: &str) -> Result<Job, Failure> {
         runs: 1,
         rearm: true,
         vehicle: None,
-        effects: None,
+        plant: PlantArgs::default(),
         config: None,
         instance: None,
         out: None,

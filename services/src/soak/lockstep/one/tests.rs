@@ -3,7 +3,7 @@
 use kerbside_messages::{AlterReason, Mode, Process};
 
 use super::*;
-use crate::lockstep::{Fault, Invariant, Kind, LineMishap, Way, draw};
+use crate::lockstep::{Fault, Invariant, Kind, LineMishap, VICTIMS, Way, draw};
 
 const SECOND: Nanos = 1_000_000_000;
 /// A garage scene; the car is well on its way after [`UNDER_WAY`].
@@ -183,7 +183,7 @@ fn a_line_that_is_silent_in_one_direction_stops_the_vehicle_in_time() {
 
 #[test]
 fn each_lasting_fault_alone_is_survived_in_the_middle_of_a_drive() {
-    for process in Process::SUPERVISED {
+    for process in VICTIMS {
         for span in [50, 150, 260, 700, 2_500].map(|ms| ms * 1_000_000) {
             let kind = Kind::Stall { process, span };
             let outcome = drive_with(&Schedule::new(vec![Fault { at: UNDER_WAY, kind }]), |_| {});
