@@ -159,7 +159,7 @@ pub mod tests {
         let shown = text(&crowded());
         assert!(shown.lines().all(|line| line.chars().count() <= 80), "{shown}");
         for words in
-            ["4194304", "given up", "12.30", "999.9", "500.0", "1024", "4000 s", "full", "350"]
+            ["4194304", "given up", "12.30", "999.9", "500.0", "1024", "4000 s", "full", "400"]
         {
             assert!(shown.contains(words), "{words}:\n{shown}");
         }

@@ -6,6 +6,7 @@ use crate::case::{Case, Run, Wheels};
 use crate::follow::spots;
 use crate::outliers::drop_outliers;
 use crate::path::driven_share;
+use crate::prepare::LEAD;
 use kerbside_simulation::Command;
 
 /// Runs that are asked for.
@@ -28,8 +29,8 @@ const SHORTEST: f64 = 3.0;
 const ELSEWHERE: f64 = 60.0;
 /// Standard deviations of its stated noise within which a row never stands out.
 const SURELY: f64 = 6.0;
-/// Commands that are kept from before a block \[s\].
-const BEFORE: f64 = 3.0;
+/// Commands that are kept from before a block \[s\]: those that its first motion comes from, and what they follow.
+const BEFORE: f64 = 2.0 * LEAD;
 /// All that is looked at \[s\]: more would say no more, and take longer.
 const MOST: f64 = 600.0;
 /// All that mistakes are looked for in \[s\].

@@ -14,6 +14,8 @@ const STEP: f64 = 0.04;
 const ASTRAY: f64 = 0.35;
 /// Commands older than this act already \[s\].
 const EARLIER: f64 = 1.0;
+/// Where commands are known for longer than this before a run, its first motion comes from them \[s\].
+pub(crate) const LEAD: f64 = 4.0;
 /// Travel below which a car has not moved, in wheel radii.
 const STANDING: f64 = 0.05;
 
@@ -116,11 +118,9 @@ impl<'a> Ready<'a> {
         let (vehicle, start) = (self.vehicle, prepared.start);
         match &prepared.commands {
             Some(commands) => {
-                Drive { vehicle, effects: *effects, commands, start, step: STEP }.trajectory_from(
-                    &prepared.motion,
-                    until,
-                    &mut trajectory,
-                );
+                let motion = led(vehicle, effects, commands).unwrap_or(prepared.motion);
+                let drive = Drive { vehicle, effects: *effects, commands, start, step: STEP };
+                drive.trajectory_from(&motion, until, &mut trajectory);
             }
             None => {
                 let Followed { speeds, racks, .. } = &prepared.measured;
@@ -225,6 +225,22 @@ fn at_once(run: &Run, motion: &InMotion) -> crate::case::Series<3> {
         row[1] -= t * motion.speed * sin;
     }
     rows
+}
+
+/// How a car moves at t = 0 that has followed its commands for longer than [`LEAD`], from the first of them on. What was
+/// measured there is noisier, and would hide the actuators' effects at each begin of a block.
+fn led(vehicle: &Vehicle, effects: &Effects, commands: &[Command]) -> Option<InMotion> {
+    let first = commands.first().filter(|first| first.t <= -LEAD)?;
+    let before = commands.iter().take_while(|command| command.t <= 0.0);
+    let earlier: Vec<Command> =
+        before.map(|command| Command { t: command.t - first.t, ..*command }).collect();
+    let mut trajectory = Trajectory::default();
+    let (start, step) = (Pose::default(), STEP);
+    let drive = Drive { vehicle, effects: *effects, commands: &earlier, start, step };
+    let held = InMotion { speed: first.speed, rack: first.steering };
+    drive.trajectory_from(&held, -first.t, &mut trajectory);
+    let now = trajectory.state(-first.t);
+    Some(InMotion { speed: now.motor_speed, rack: now.rack })
 }
 
 /// Commands of a run; one that is under way at t = 0 held its motion until the first of them acts.

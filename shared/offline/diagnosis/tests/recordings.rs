@@ -46,6 +46,15 @@ fn begun(run: &Run, later: f64, zero: f64) -> Run {
 }
 
 #[test]
+fn one_long_log_is_cut_into_blocks_that_serve_as_runs() {
+    let found = answer(&one_log(&with("steering_offset", "offset", 0.025), 132.0, 21));
+    names(&found, "steering_offset", 0.025, 0.003);
+    let said = |words: &str| found.notices.iter().any(|notice| notice.contains(words));
+    assert!(said("12 blocks of 1 drive") && said("one run: six are asked for"));
+    assert!(found.gap.expect("a reference").removed.expect("a gap").value > 0.8);
+}
+
+#[test]
 fn a_log_that_begins_under_way_and_at_any_stamp_has_the_same_answer() {
     let mut late = case(&with("speed_gain", "gain", 0.95), ALL, 22);
     late.runs = late.runs.iter().map(|run| begun(run, 2.5, 1.7e9)).collect();

@@ -151,8 +151,7 @@ impl Trajectory {
     /// What `of` makes of the knots around `t` and the share of the way between them; of one knot outside the drive.
     fn shown<R>(&self, t: f64, of: impl Fn(&Knot, &Knot, f64) -> R) -> R {
         let Some((before, after)) = self.around(t) else {
-            let only = if t > 0.0 { self.knots.last() } else { self.knots.first() };
-            let only = only.copied().unwrap_or_default();
+            let only = self.state(t);
             return of(&only, &only, 0.0);
         };
         let span = after.time - before.time;

@@ -200,15 +200,11 @@ mod tests {
     #[test]
     fn what_broke_is_the_verdict_and_what_held_is_too() {
         let held = report(true).render().unwrap();
-        assert!(
-            held.contains("Held.") && held.contains("67 %") || held.contains("67\u{202f}%"),
-            "{held}"
-        );
+        assert!(held.contains("Held.") && held.contains("66.7"), "{held}");
         let broken = report(false).render().unwrap();
-        assert!(
-            broken.contains("Broken.") && broken.contains("&lt;rolled&gt;")
-                || broken.contains("&#60;rolled&#62;")
-        );
+        let escaped =
+            ["&lt;rolled&gt;", "&#60;rolled&#62;"].iter().any(|text| broken.contains(text));
+        assert!(broken.contains("Broken.") && escaped);
         assert!(broken.contains("kill tracker in driving: did not stop"));
     }
 
