@@ -1,6 +1,6 @@
 //! Fuzzing: whatever bytes come over the line, either end stays within its words.
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic)] // Helpers of a test are part of it.
 
-#[allow(clippy::unwrap_used, clippy::panic)] // The helpers of a test end loudly.
 #[path = "../../../../tests/common_fuzz/mod.rs"]
 mod common_fuzz;
 

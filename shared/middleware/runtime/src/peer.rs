@@ -90,7 +90,8 @@ mod tests {
         let mut ours: Vec<_> =
             rustix::process::getgroups().unwrap().iter().map(|group| group.as_raw()).collect();
         let mut theirs = peer.groups[1..].to_vec();
-        (ours.sort_unstable(), theirs.sort_unstable());
+        ours.sort_unstable();
+        theirs.sort_unstable();
         assert_eq!(theirs, ours);
     }
 
