@@ -12,7 +12,7 @@ use kerbside_simulation::effects::Link;
 
 /// An effect is at least so many of the standard errors that drives left out show of its size.
 const REPEATS: f64 = 2.5;
-/// Share of the runs that an effect helps while they are left out.
+/// Share of the blocks of a cut drive that an effect helps while they are left out.
 const HELPS: f64 = 0.5;
 /// Sets below this probability are not asked.
 const WORTH: f64 = 0.02;
@@ -113,13 +113,18 @@ fn doubt(search: &Search<'_>, fit: &Fit, nothing: Option<&Linearised>) -> Option
         }
         row += at.len();
     }
-    let gains = left_out(search, nothing?, fit, &own);
+    // Runs of their own are evidence of their own; blocks of one drive share what happened in it.
+    if search.bench.groups().len() == search.bench.all().len() {
+        return None;
+    }
+    let mut gains = left_out(search, nothing?, fit, &own);
+    gains.retain(|gain| gain.is_finite());
     let helped = to_f64(gains.iter().filter(|gain| **gain > 0.0).count());
     let first = search.candidates[*fit.set.first()?].definition;
     (helped < HELPS * to_f64(gains.len()) && gains.len() > 1).then(|| {
         (
             first.link,
-            format!("{} helps fewer than half of the runs while they are left out", first.id),
+            format!("{} helps fewer than half of the blocks while they are left out", first.id),
         )
     })
 }
