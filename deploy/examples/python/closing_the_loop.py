@@ -41,7 +41,7 @@ def wait_for(what, look):
         found = look()
         if found is not None:
             return found
-        time.sleep(0.005)
+        time.sleep(0.005)  # The rate at which it looks: as often as the vehicle is read.
     sys.exit(f"{what} does not come")
 
 

@@ -139,5 +139,5 @@ class Client:
                 answer = self.answer.payload.from_buffer_copy(response.payload().contents)
                 messages.verify(self.answer, answer)
                 return answer
-            time.sleep(0.001)
+            time.sleep(0.001)  # The rate at which it looks, until `patience` is over.
         return None

@@ -14,15 +14,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
 use kerbside_messages::{
-    Command, Fix, Header, Inhibit, Nanos, Odometry, PlanAnswer, PlanRequest, Process, State,
+    Command, Fix, Header, Inhibit, Odometry, PlanAnswer, PlanRequest, Process, State,
 };
 use kerbside_runtime::{Instance, Session, Subscriber, Ticker};
 use serde_json::json;
 
-use super::drive::{Account, Drive, Watch};
-use super::pipeline::{Scheduling, ends};
-use super::rows::{Row, Told, tell};
-use super::statistics::{Blocks, ratio_of_medians};
+use super::drive::Drive;
+use super::pipeline::Scheduling;
+use super::rows::{Told, tell};
+use super::side::{Side, WINDOW, all_measured};
 use crate::exit::{Exit, Failure};
 use crate::life::stop_flag;
 
@@ -30,10 +30,6 @@ use crate::life::stop_flag;
 const LIMIT: f64 = 1.5;
 /// The same at p99, which a single pause of the machine decides.
 const LIMIT_P99: f64 = 3.0;
-/// Windows of accounted work.
-const WINDOW: Duration = Duration::from_millis(100);
-/// Windows of a slice.
-const SLICE: u32 = 10;
 /// Time between two rounds of rubbish.
 const ROUND: Duration = Duration::from_millis(1);
 /// Hostile clients of the gateway.
@@ -74,14 +70,6 @@ enum Beside {
     Clients,
 }
 
-/// What was measured beside one of them.
-#[derive(Debug, Default)]
-struct Side {
-    latencies: Blocks,
-    /// Work per reading of each window \[us\].
-    work: Vec<f64>,
-}
-
 /// Runs the verb.
 ///
 /// # Errors
@@ -102,57 +90,20 @@ pub fn run(args: &HostileArgs) -> Result<Exit, Failure> {
     while kept < args.seconds && drive.goes_on(&mut watch, &mut tick)? {
         let beside = [Beside::Nobody, Beside::Rogue, Beside::Clients][kept as usize % sides.len()];
         let harm = Harm::start(beside, &drive.instance, &socket)?;
-        tick.wait();
-        watch.take_in();
-        let (latencies, work) = slice(&mut watch, &mut tick);
-        drop(harm);
-        // What was measured while a fault stopped the car says nothing of a car that drives.
-        if watch.drives() && !latencies.is_empty() {
-            let side = &mut sides[beside as usize];
-            side.latencies.0.push(latencies);
-            side.work.extend(work);
-            kept += 1;
-        }
+        kept += u32::from(sides[beside as usize].measure(&mut watch, &mut tick, harm));
     }
     drop((watch, session));
-    if sides.iter().any(|side| side.latencies.0.is_empty()) {
-        let words = "the manoeuvre was over before there was anything to compare";
-        return Err(Failure::unavailable(words));
-    }
+    all_measured(&sides)?;
     Ok(tell(&told(&sides), args.json))
-}
-
-/// Latencies, and work per reading of each window.
-fn slice(watch: &mut Watch, tick: &mut Ticker) -> (Vec<Nanos>, Vec<f64>) {
-    let pids = watch.pids();
-    let (mut latencies, mut work) = (Vec::new(), Vec::new());
-    let mut before = Account::of(&pids, watch.readings);
-    for _ in 0..SLICE - 1 {
-        tick.wait();
-        latencies.extend(watch.take_in());
-        let after = Account::of(&pids, watch.readings);
-        work.extend(after.since(&before).map(|each| each.iter().sum::<f64>()));
-        before = after;
-    }
-    (latencies, work)
 }
 
 fn told([alone, rogue, clients]: &[Side; 3]) -> Told {
     let mut rows = Vec::new();
     let mut figures = Vec::new();
     for (name, side) in [("beside a rogue", rogue), ("beside hostile clients", clients)] {
-        let latency = format!("reading to command, {name}");
-        let latency = Row::of(&latency, 0, &side.latencies, "alone", &alone.latencies);
+        let [latency, work] = side.against(alone, name, "alone");
         figures.extend(latency.figures(LIMIT, Some(LIMIT_P99)));
-        rows.push(latency);
-        rows.push(Row {
-            name: format!("own work, {name}"),
-            bytes: 0,
-            ours: ends(&side.work),
-            rival: "alone".to_owned(),
-            rivals: ends(&alone.work),
-            ratio: ratio_of_medians(&side.work, &alone.work),
-        });
+        rows.extend([latency, work]);
     }
     Told { verb: "hostile", figures, rows, notes: vec![], more: json!({}) }
 }

@@ -9,6 +9,7 @@ mod peer;
 mod pipeline;
 mod replay;
 mod rows;
+mod side;
 mod start;
 mod statistics;
 mod tools;

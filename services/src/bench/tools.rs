@@ -3,26 +3,20 @@
 //! One stack drives; every other second `top` runs beside it, subscribed to every topic. Latencies come from the
 //! commands' stamps; work is what the kernel accounts to the processes of the control path, per reading.
 
-use core::time::Duration;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Stdio};
 
-use kerbside_messages::Nanos;
 use kerbside_runtime::{Instance, Ticker};
 use serde_json::json;
 
-use super::drive::{Account, Drive, Watch};
-use super::pipeline::{Scheduling, ends};
-use super::rows::{Row, Told, tell};
-use super::statistics::{Blocks, ratio_of_medians};
+use super::drive::Drive;
+use super::pipeline::Scheduling;
+use super::rows::{Told, tell};
+use super::side::{Side, WINDOW, all_measured};
 use crate::exit::{Exit, Failure};
 
 /// Latency and work beside `top` may be so many times those without.
 const LIMIT: f64 = 1.1;
-/// Windows of accounted work.
-const WINDOW: Duration = Duration::from_millis(100);
-/// Windows of a slice with or without `top`.
-const SLICE: u32 = 10;
 
 /// What `bench tools` is asked.
 #[derive(Clone, Debug, clap::Args)]
@@ -68,14 +62,6 @@ impl Drop for Top {
     }
 }
 
-/// What was measured with or without `top`.
-#[derive(Debug, Default)]
-struct Side {
-    latencies: Blocks,
-    /// Work per reading of each window \[us\].
-    work: Vec<f64>,
-}
-
 /// Runs the verb.
 ///
 /// # Errors
@@ -84,63 +70,25 @@ pub fn run(args: &ToolsArgs) -> Result<Exit, Failure> {
     let mut drive = Drive::start(&args.scenario, &Scheduling::ordinary().stack())?;
     let (session, mut watch) = drive.join()?;
     let mut tick = Ticker::new(WINDOW);
-    let (mut alone, mut watched) = (Side::default(), Side::default());
+    let mut sides = [Side::default(), Side::default()];
     let mut kept = 0;
     while kept < args.seconds && drive.goes_on(&mut watch, &mut tick)? {
         let beside = kept % 2 == 1;
         let top = beside.then(|| Top::start(&drive.instance)).transpose()?;
-        tick.wait();
-        watch.take_in();
-        let (latencies, work) = slice(&mut watch, &mut tick);
-        drop(top);
-        // What was measured while a fault stopped the car says nothing of a car that drives.
-        if watch.drives() && !latencies.is_empty() {
-            let side = if beside { &mut watched } else { &mut alone };
-            side.latencies.0.push(latencies);
-            side.work.extend(work);
-            kept += 1;
-        }
+        kept += u32::from(sides[usize::from(beside)].measure(&mut watch, &mut tick, top));
     }
     drop((watch, session));
-    if watched.latencies.0.is_empty() {
-        let words = "the manoeuvre was over before there was anything to compare";
-        return Err(Failure::unavailable(words));
-    }
-    Ok(tell(&told(&alone, &watched), args.json))
+    all_measured(&sides)?;
+    Ok(tell(&told(&sides), args.json))
 }
 
-/// Latencies, and work per reading of each window.
-fn slice(watch: &mut Watch, tick: &mut Ticker) -> (Vec<Nanos>, Vec<f64>) {
-    let pids = watch.pids();
-    let (mut latencies, mut work) = (Vec::new(), Vec::new());
-    let mut before = Account::of(&pids, watch.readings);
-    for _ in 0..SLICE - 1 {
-        tick.wait();
-        latencies.extend(watch.take_in());
-        let after = Account::of(&pids, watch.readings);
-        work.extend(after.since(&before).map(|each| each.iter().sum::<f64>()));
-        before = after;
-    }
-    (latencies, work)
-}
-
-fn told(alone: &Side, watched: &Side) -> Told {
-    let rival = "without top";
-    let name = "reading to command, with top";
-    let latency = Row::of(name, 0, &watched.latencies, rival, &alone.latencies);
-    let work = Row {
-        name: "own work, with top".to_owned(),
-        bytes: 0,
-        ours: ends(&watched.work),
-        rival: rival.to_owned(),
-        rivals: ends(&alone.work),
-        ratio: ratio_of_medians(&watched.work, &alone.work),
-    };
-    let figures = latency.figures(LIMIT, None).into_iter().chain(work.figures(LIMIT, None));
+fn told([alone, watched]: &[Side; 2]) -> Told {
+    let rows = watched.against(alone, "with top", "without top");
+    let figures = rows.iter().flat_map(|row| row.figures(LIMIT, None));
     Told {
         verb: "tools",
         figures: figures.collect(),
-        rows: vec![latency, work],
+        rows: rows.to_vec(),
         notes: vec![],
         more: json!({}),
     }

@@ -69,6 +69,28 @@ pub struct ParkArgs {
     pub log: Option<String>,
 }
 
+impl ParkArgs {
+    /// One run of a scenario that another verb asks for, as processes, without a word on the terminal.
+    #[must_use]
+    pub fn of(scenario: &str) -> Self {
+        Self {
+            scenario: scenario.to_owned(),
+            lockstep: false,
+            seed: 1,
+            runs: 1,
+            rearm: false,
+            vehicle: None,
+            plant: PlantArgs::default(),
+            config: None,
+            instance: None,
+            out: None,
+            headless: true,
+            json: false,
+            log: None,
+        }
+    }
+}
+
 /// A manoeuvre to run.
 #[derive(Clone, Debug)]
 pub struct Job {

@@ -8,7 +8,6 @@ use crate::exit::Failure;
 use crate::lockstep::Schedule;
 use crate::output;
 use crate::park::{self, ParkArgs};
-use crate::vehicle::PlantArgs;
 
 /// The scenes of the paper's Table 3, and the same again full size.
 const SCENES: [&str; 4] = ["garage", "parallel", "garage-full-size", "parallel-full-size"];
@@ -47,21 +46,8 @@ fn one_scene(
         parked: 0,
         causes: Vec::new(),
     };
-    let args = ParkArgs {
-        scenario: scene.to_owned(),
-        lockstep,
-        seed,
-        runs,
-        rearm: false,
-        vehicle: None,
-        plant: PlantArgs::default(),
-        config: None,
-        instance: None,
-        out: None,
-        headless: true,
-        json: false,
-        log: Some("warn".to_owned()),
-    };
+    let args =
+        ParkArgs { lockstep, seed, runs, log: Some("warn".to_owned()), ..ParkArgs::of(scene) };
     for index in 0..runs {
         let seed = seed + u64::from(index);
         let folder =

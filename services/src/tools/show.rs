@@ -45,29 +45,19 @@ pub fn sample(topic: &Topic, bytes: &[u8], tail: &[u8]) -> Shown {
 }
 
 fn record(layout: &Layout, bytes: &[u8]) -> Vec<(&'static str, Shown)> {
-    let shown = layout.fields.iter().filter(|field| field.name != "reserved");
+    let shown = layout.fields.iter().filter(|field| !field.is_reserved());
     shown.map(|field| (field.name, field_of(field, bytes))).collect()
 }
 
 fn field_of(field: &Field, bytes: &[u8]) -> Shown {
-    let size = size_of_kind(field.kind);
+    let size = field.kind.size();
     let bytes = bytes.get(field.offset..).unwrap_or_default();
     let Some(count) = field.count else { return element(field, bytes) };
     let bytes = &bytes[..bytes.len().min(size * count)];
-    if field.meaning == Meaning::Text {
+    if field.is_text() {
         return Shown::Text(text::as_str(bytes).to_owned());
     }
     Shown::List(bytes.chunks_exact(size).map(|bytes| element(field, bytes)).collect())
-}
-
-fn size_of_kind(kind: Kind) -> usize {
-    match kind {
-        Kind::U8 | Kind::I8 => 1,
-        Kind::U16 => 2,
-        Kind::U32 => 4,
-        Kind::U64 | Kind::I64 | Kind::F64 => 8,
-        Kind::Nested(part) => part.size,
-    }
 }
 
 fn element(field: &Field, bytes: &[u8]) -> Shown {
@@ -261,7 +251,7 @@ fn follow(topic: &Topic, place: Place, word: &str) -> Result<(Step, Place), Stri
                 let list = Place::List(Kind::Nested(element), kerbside_messages::MAX_PLAN_POINTS);
                 return Ok((Step::Field(TAIL), list));
             }
-            let shown = || layout.fields.iter().filter(|field| field.name != "reserved");
+            let shown = || layout.fields.iter().filter(|field| !field.is_reserved());
             let Some(field) = shown().find(|field| field.name == word) else {
                 let names = shown().map(|field| field.name).chain(has_tail.then_some(TAIL));
                 return Err(names.collect::<Vec<_>>().join(", "));

@@ -19,7 +19,6 @@ use crate::lockstep::VICTIMS;
 use crate::park::live::Desk;
 use crate::park::{self, Job, ParkArgs};
 use crate::vehicle::format_pose;
-use crate::vehicle::plant::PlantArgs;
 
 /// A vehicle without a supervisor stands if it has not moved for so long \[ns\].
 const STANDS: Nanos = 200_000_000;
@@ -30,19 +29,12 @@ const STANDS: Nanos = 200_000_000;
 /// [`Failure`] where the configuration is refused.
 pub fn job(args: &SoakArgs, folder: &Path) -> Result<Job, Failure> {
     let park = ParkArgs {
-        scenario: args.scenario.clone(),
-        lockstep: false,
         seed: args.seed.unwrap_or(1),
-        runs: 1,
         rearm: true,
-        vehicle: None,
-        plant: PlantArgs::default(),
         config: args.config.clone(),
         instance: Some(args.instance.clone().unwrap_or_else(|| Instance::fresh_name("soak"))),
-        out: None,
-        headless: true,
-        json: false,
         log: Some("error".to_owned()),
+        ..ParkArgs::of(&args.scenario)
     };
     park::job(&park, park.seed, folder)
 }

@@ -278,17 +278,8 @@ mod tests {
         assert_eq!(matrix.left(), 8 * 2 * 7);
         let mut now = MS;
         let mut struck = Vec::new();
-        let modes = [
-            Mode::Starting,
-            Mode::Ready,
-            Mode::Armed,
-            Mode::Driving,
-            Mode::Done,
-            Mode::Stopping,
-            Mode::Faulted,
-        ];
         while matrix.left() > 0 {
-            for mode in modes {
+            for mode in MODES {
                 now += MS;
                 if let Some(Wish::Strike(process, blow)) = matrix.wish(&sight(now, mode)) {
                     struck.push((process, blow.name(), mode));

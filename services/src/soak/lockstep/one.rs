@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use crate::vehicle::plant::{Plant, PlantArgs};
+use crate::vehicle::plant::Plant;
 use kerbside_messages::{Nanos, Odometry, PlanRequest};
 
 use crate::exit::Failure;
@@ -62,21 +62,7 @@ fn place(seed: u64) -> usize {
 }
 
 fn job_of(scene: &str) -> Result<Job, Failure> {
-    let args = ParkArgs {
-        scenario: scene.to_owned(),
-        lockstep: true,
-        seed: 1,
-        runs: 1,
-        rearm: true,
-        vehicle: None,
-        plant: PlantArgs::default(),
-        config: None,
-        instance: None,
-        out: None,
-        headless: true,
-        json: false,
-        log: None,
-    };
+    let args = ParkArgs { lockstep: true, rearm: true, ..ParkArgs::of(scene) };
     let mut job = park::job(&args, args.seed, std::path::Path::new(""))?;
     job.service.args.realtime = false;
     Ok(job)

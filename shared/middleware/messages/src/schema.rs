@@ -107,21 +107,12 @@ mod tests {
 
     #[test]
     fn layouts_have_no_gap_and_cdr_alignment() {
-        fn size(kind: Kind) -> usize {
-            match kind {
-                Kind::U8 | Kind::I8 => 1,
-                Kind::U16 => 2,
-                Kind::U32 => 4,
-                Kind::U64 | Kind::I64 | Kind::F64 => 8,
-                Kind::Nested(part) => part.size,
-            }
-        }
         fn alignment(kind: Kind) -> usize {
             match kind {
                 Kind::Nested(part) => {
                     part.fields.iter().map(|field| alignment(field.kind)).max().unwrap_or(1)
                 }
-                other => size(other),
+                other => other.size(),
             }
         }
         fn check(layout: &Layout) {
@@ -135,7 +126,7 @@ mod tests {
                     layout.name,
                     field.name
                 );
-                end += size(field.kind) * field.count.unwrap_or(1);
+                end += field.kind.size() * field.count.unwrap_or(1);
                 if let Kind::Nested(part) = field.kind {
                     check(part);
                 }

@@ -6,18 +6,10 @@
 #[allow(dead_code)] // What the other tests use.
 mod support;
 
-use kerbside_diagnosis::{Case, Diagnosis, DiagnosisError, Settings, Verdict, Wheels, diagnose};
+use kerbside_diagnosis::{DiagnosisError, Settings, Verdict, Wheels, diagnose};
 use kerbside_simulation::effects::Link;
 use kerbside_simulation::{Effects, Parameter};
-use support::{ALL, Sensors, case};
-
-fn answer(case: &Case) -> Diagnosis {
-    diagnose(case, &Settings::default(), &|_, _| {}).expect("a diagnosis")
-}
-
-fn with(id: &str, name: &str, value: f64) -> Effects {
-    Effects::NEUTRAL.with(Parameter::find(id, name).expect("listed"), value)
-}
+use support::{ALL, Sensors, answer, case, with};
 
 fn finds(id: &str, name: &str, value: f64, link: Link, tolerance: f64) {
     let found = answer(&case(&with(id, name, value), ALL, 1));

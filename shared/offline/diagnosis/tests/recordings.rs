@@ -6,18 +6,10 @@
 #[allow(dead_code)] // What the other tests use.
 mod support;
 
-use kerbside_diagnosis::{Case, Diagnosis, Run, Series, Settings, Verdict, Wheels, diagnose};
+use kerbside_diagnosis::{Diagnosis, Run, Series, Verdict, Wheels};
 use kerbside_simulation::effects::Link;
-use kerbside_simulation::{Command, Effects, Parameter};
-use support::{ALL, case, one_log};
-
-fn answer(case: &Case) -> Diagnosis {
-    diagnose(case, &Settings::default(), &|_, _| {}).expect("a diagnosis")
-}
-
-fn with(id: &str, name: &str, value: f64) -> Effects {
-    Effects::NEUTRAL.with(Parameter::find(id, name).expect("listed"), value)
-}
+use kerbside_simulation::{Command, Effects};
+use support::{ALL, answer, case, one_log, with};
 
 fn names(found: &Diagnosis, id: &str, value: f64, tolerance: f64) {
     assert_eq!(found.verdict, Verdict::Effects, "{}", found.sentence);

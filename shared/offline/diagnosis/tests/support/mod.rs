@@ -4,9 +4,9 @@
 
 use core::f64::consts::TAU;
 
-use kerbside_diagnosis::{Allowance, Case, Run, Series, Wheels};
+use kerbside_diagnosis::{Allowance, Case, Diagnosis, Run, Series, Settings, Wheels, diagnose};
 use kerbside_geometry::{Gyro, Pose, Reference, Vehicle, math};
-use kerbside_simulation::{Command, Drive, Effects, Trajectory};
+use kerbside_simulation::{Command, Drive, Effects, Parameter, Trajectory};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -16,6 +16,16 @@ pub(crate) struct Sensors {
     pub(crate) steering: bool,
     pub(crate) gyro: bool,
     pub(crate) yaw: bool,
+}
+
+/// What is said of a case.
+pub(crate) fn answer(case: &Case) -> Diagnosis {
+    diagnose(case, &Settings::default(), &|_, _| {}).expect("a diagnosis")
+}
+
+/// One effect.
+pub(crate) fn with(id: &str, name: &str, value: f64) -> Effects {
+    Effects::NEUTRAL.with(Parameter::find(id, name).expect("listed"), value)
 }
 
 pub(crate) const ALL: Sensors = Sensors { steering: true, gyro: true, yaw: true };
