@@ -417,7 +417,10 @@ fn an_ordinary_user_parks_and_another_one_cannot_reach_it() {
     as_user(PEER, verb(&["up", "--simulate", "--instance", "one"])).refuses(75, &["kerbside"]);
 
     let said = park.end();
-    assert_eq!((said.code, said.stderr.as_str()), (Some(0), ""), "{said:?}");
+    // Those who look make a small machine late now and then; it is armed again, and says so.
+    let other = |line: &&str| !line.ends_with("cause=deadline missed");
+    let others: Vec<_> = said.stderr.lines().filter(other).collect();
+    assert_eq!((said.code, others), (Some(0), Vec::new()), "{said:?}");
     assert_eq!(said.json()["parked"], true);
     sandbox.assert_empty();
 }
