@@ -215,6 +215,37 @@ fn a_restore_over_which_no_wheel_can_have_turned_so_far_is_a_lost_pose() {
 }
 
 #[test]
+fn counters_that_began_anew_while_ingest_was_dead_are_a_lost_pose() {
+    for back in [0.05, 0.3, 0.6] {
+        let vehicle = fine_car(32);
+        let (mut chain, mut car) = under_way(&vehicle);
+        unseen(&mut car, 10);
+        for rolled in &mut car.rolled {
+            *rolled -= back;
+        }
+        chain.ingest = ingest(&vehicle);
+        drive(&mut chain, &mut car, 0.3, 2);
+        assert_eq!(chain.odometry.state, State::Lost.code(), "{back} m back");
+        assert_eq!(chain.odometry.reset_reason, Reason::CounterReset.code());
+    }
+}
+
+#[test]
+fn a_vehicle_that_brakes_while_ingest_is_dead_keeps_its_pose() {
+    let vehicle = fine_car(32);
+    let (mut chain, mut car) = under_way(&vehicle);
+    let period = 0.005;
+    let mut speed = 0.3_f64;
+    for _ in 0..80 {
+        speed = (speed - vehicle.limits.deceleration * period).max(0.0);
+        car.roll(speed, 0.2);
+    }
+    chain.ingest = ingest(&vehicle);
+    drive(&mut chain, &mut car, speed, 2);
+    assert_true(&chain, &car, 1e-3);
+}
+
+#[test]
 fn wheel_speeds_do_not_survive_ingest() {
     let mut vehicle = fine_car(32);
     vehicle.encoders = None;

@@ -31,13 +31,8 @@ use fused::{Fused, Setup};
 use gyro::GyroIntegral;
 pub use increment::{Estimate, Increment};
 use model::{Aids, Model};
-use odometer::{Brought, Odometer};
+use odometer::{Brought, Gap, Odometer};
 use twist::Twist;
-
-/// Over a gap a wheel may have turned so many times faster than its top speed, and stamps may be
-/// off by so much \[s\], before the pose counts as lost.
-const GAP_MARGIN: f64 = 5.0;
-const GAP_SLACK: f64 = 0.1;
 
 /// What the estimator takes in a step.
 #[derive(Clone, Copy, Debug)]
@@ -94,6 +89,7 @@ pub struct Estimator {
     front: Option<FrontCorrection>,
     fused: Option<Fused>,
     settings: EstimatorSettings,
+    limits: (f64, f64),
     curvature: f64,
     wheels: Odometer,
     gyro: GyroIntegral,
@@ -159,6 +155,7 @@ impl Estimator {
         let fused = (settings.filter == Filter::Fused)
             .then(|| Fused::new(Setup::new(vehicle, sensors, settings, prior, &scales)));
         let uses_gyro = model.uses_gyro() || fused.is_some() && sensors.gyro;
+        let limits = &vehicle.limits;
         let gyro_noise = vehicle.gyro.map_or(settings.gyro_noise, |gyro| gyro.noise);
         let mut estimator = Self {
             wheels: Odometer::new(scales, model.needed()),
@@ -167,6 +164,7 @@ impl Estimator {
             fused,
             uses_gyro,
             settings: settings.clone(),
+            limits: (limits.speed, limits.acceleration.max(limits.deceleration)),
             curvature: wheels::largest_curvature(vehicle),
             gyro: GyroIntegral::new(gyro_noise),
             steering: None,
@@ -287,11 +285,10 @@ impl Estimator {
     /// Brings what the wheels have rolled into the pose, if all that the model needs is there.
     fn roll(&mut self, travel: &Travel) {
         let stamp = travel.header.stamp;
-        let since = elapsed(stamp, self.rolled);
         if !self.wheels.ready() && !self.goes_without(stamp) {
             return;
         }
-        if self.gap_pending && self.wheels.beyond_belief(since, GAP_SLACK, GAP_MARGIN) {
+        if self.gap_pending && self.wheels.beyond_belief(&self.gap(stamp)) {
             self.lose();
             self.applied(stamp, 0.0, 0.0);
             return;
@@ -316,6 +313,12 @@ impl Estimator {
         }
         self.distance += piece.distance.abs();
         self.applied(stamp, piece.distance, piece.turn);
+    }
+
+    fn gap(&self, stamp: Nanos) -> Gap {
+        let (top_speed, acceleration) = self.limits;
+        let elapsed = elapsed(stamp, self.rolled);
+        Gap { elapsed, speed: self.twist.speed(), top_speed, acceleration }
     }
 
     fn applied(&mut self, stamp: Nanos, distance: f64, turn: f64) {

@@ -5,6 +5,38 @@ use kerbside_messages::{FilterState, Travel, WheelStatus};
 use super::bits::{bits, of_bits};
 use crate::wheels::WheelScale;
 
+/// Over a gap a wheel may have turned so many times faster than its top speed, the vehicle may have
+/// accelerated so many times harder than its limits say, and stamps may be off by so much \[s\],
+/// before the pose counts as lost.
+const GAP_MARGIN: f64 = 5.0;
+const GAP_ACCELERATION: f64 = 3.0;
+const GAP_SLACK: f64 = 0.1;
+
+/// A time over which the wheels were not read.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gap {
+    /// How long it was \[s\].
+    pub(crate) elapsed: f64,
+    /// The vehicle's speed before it, where it is known \[m/s\].
+    pub(crate) speed: Option<f64>,
+    /// Top speed \[m/s\] of the vehicle.
+    pub(crate) top_speed: f64,
+    /// The larger of its acceleration and deceleration \[m/s^2\].
+    pub(crate) acceleration: f64,
+}
+
+impl Gap {
+    /// Whether `turned` metres of a wheel are not what the speed before and any acceleration make
+    /// of the time, for a wheel up to `factor` times as fast as the vehicle and `slack` metres.
+    fn contradicts(&self, turned: f64, factor: f64, slack: f64) -> bool {
+        let Some(speed) = self.speed else { return false };
+        let held = speed * self.elapsed;
+        let gained = 0.5 * GAP_ACCELERATION * self.acceleration * self.elapsed * self.elapsed;
+        let around = (factor - 1.0) * held.abs() + factor * (gained + speed.abs() * GAP_SLACK);
+        (turned - held).abs() > around + slack
+    }
+}
+
 /// What a travel brought.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Brought {
@@ -149,14 +181,20 @@ impl Odometer {
         (0..4).filter(|index| pending(*index)).fold(0.0, largest)
     }
 
-    /// Whether a wheel has turned farther than any can within `elapsed` seconds, `slack` seconds
-    /// and a factor allowed for, or may have turned so far that absolute counts no longer tell.
-    pub(crate) fn beyond_belief(&self, elapsed: f64, slack: f64, margin: f64) -> bool {
-        (0..4).filter(|index| self.needed[*index] && !self.lost[*index]).any(|index| {
+    /// Whether a wheel has turned over a gap as none can: farther than its top speed carries it,
+    /// or so far off the way that the speed before the gap foretells that no acceleration explains
+    /// it, or maybe so far that absolute counts no longer tell. Counters that began anew unseen are
+    /// told by that.
+    pub(crate) fn beyond_belief(&self, gap: &Gap) -> bool {
+        let used = |index: &usize| self.needed[*index] && !self.lost[*index];
+        (0..4).filter(used).any(|index| {
             let scale = &self.scales[index];
-            let reach = margin * scale.top_speed * (elapsed + slack);
-            self.unapplied(index).abs() > reach + 2.0 * scale.metres_per_count
-                || scale.top_speed * elapsed > 0.5 * scale.ring()
+            let turned = self.unapplied(index);
+            let counts = 2.0 * scale.metres_per_count;
+            let reach = GAP_MARGIN * scale.top_speed * (gap.elapsed + GAP_SLACK);
+            turned.abs() > reach + counts
+                || gap.contradicts(turned, scale.top_speed / gap.top_speed, counts)
+                || scale.top_speed * gap.elapsed > 0.5 * scale.ring()
         })
     }
 

@@ -33,6 +33,7 @@ pub(crate) struct Twist {
     head: usize,
     now: Entry,
     interval: f64,
+    known: bool,
     speed: f64,
     yaw_rate: f64,
 }
@@ -45,6 +46,7 @@ impl Twist {
             head: 0,
             now: Entry::default(),
             interval: 0.0,
+            known: false,
             speed: 0.0,
             yaw_rate: 0.0,
         }
@@ -70,11 +72,17 @@ impl Twist {
         (self.speed * fading, self.yaw_rate * fading)
     }
 
+    /// Speed at the last push, where there were pushes over long enough a time \[m/s\].
+    pub(crate) fn speed(&self) -> Option<f64> {
+        self.known.then_some(self.speed)
+    }
+
     fn differentiate(&mut self) {
-        (self.speed, self.yaw_rate) = (0.0, 0.0);
+        (self.speed, self.yaw_rate, self.known) = (0.0, 0.0, false);
         let Some(then) = self.reference().copied() else { return };
         let interval = elapsed(self.now.stamp, then.stamp);
         if interval >= SHORTEST {
+            self.known = true;
             self.speed = (self.now.distance - then.distance) / interval;
             self.yaw_rate = (self.now.turn - then.turn) / interval;
         }
