@@ -5,6 +5,7 @@
 //! reached from the start in closed form; every piece is held against the obstacles over its
 //! whole sweep, exactly; the path is put in time under the vehicle's limits and sampled.
 
+mod bound;
 mod connect;
 mod cost;
 mod failure;

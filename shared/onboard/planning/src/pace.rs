@@ -75,6 +75,11 @@ impl Pace {
         self.drive(length).duration()
     }
 
+    /// What a change of the steering takes at least, however small \[s\].
+    pub(crate) fn steer_least(&self) -> f64 {
+        self.steer(0.0).duration() + self.settle
+    }
+
     /// Time at a standstill to bring the steering from one curvature to another \[s\].
     pub(crate) fn steer_time(&self, from: f64, to: f64, gear_change: bool) -> f64 {
         let angle = self.steering(to) - self.steering(from);

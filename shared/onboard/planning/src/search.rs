@@ -9,6 +9,7 @@
 
 use kerbside_geometry::{Pose, angle};
 
+use crate::bound::Bound;
 use crate::connect::{self, Link};
 use crate::cost::Cost;
 use crate::problem::Problem;
@@ -20,6 +21,8 @@ use crate::tree::{Node, Resolution, Tree};
 const LENGTHS: [u8; 14] = [1, 2, 3, 4, 5, 6, 8, 10, 13, 17, 22, 29, 38, 50];
 /// Their curvatures, in shares of the greatest.
 const CURVATURES: [f64; 5] = [0.0, 1.0, -1.0, 0.5, -0.5];
+/// Directions of travel and curvatures.
+const UNITS: usize = 2 * CURVATURES.len();
 /// Halvings by which the farthest pose that is still clear is found.
 const HALVINGS: u32 = 4;
 /// Nodes between two signs of progress.
@@ -85,10 +88,31 @@ struct Joint {
     gear_changes: u32,
 }
 
+/// A direction of travel and a curvature that are tried from every node.
+#[derive(Clone, Copy, Debug)]
+struct Unit {
+    /// One metre of it.
+    piece: Piece,
+    /// Time to bring the steering there from straight ahead \[s\].
+    first: f64,
+}
+
+impl Unit {
+    fn all(cost: &Cost, curvature: f64) -> [Self; UNITS] {
+        core::array::from_fn(|index| {
+            let gear = if index < CURVATURES.len() { 1.0 } else { -1.0 };
+            let piece = Piece::new(gear, CURVATURES[index % CURVATURES.len()] * curvature);
+            Self { piece, first: cost.first(&piece) }
+        })
+    }
+}
+
 struct Search<'a> {
     problem: &'a Problem,
     attempt: Attempt,
     cost: Cost,
+    bound: Bound,
+    units: [Unit; UNITS],
     step: f64,
     tree: Tree,
     links: Vec<Link>,
@@ -107,11 +131,14 @@ impl<'a> Search<'a> {
         let resolution = Resolution::halved(problem.wheelbase, attempt.grid);
         let mut tree = Tree::new(resolution);
         let goal = Node { pose: problem.goal, cost: 0.0, next: None, gear_changes: 0 };
-        tree.push(goal, 0.0);
+        tree.push(goal, 0.0, 0.0);
+        let cost = Cost::new(problem.pace, problem.wheelbase, problem.curvature);
         Self {
             problem,
             attempt,
-            cost: Cost::new(problem.pace, problem.wheelbase, problem.curvature),
+            cost,
+            units: Unit::all(&cost, problem.curvature),
+            bound: Bound::new(problem.pace, problem.start, problem.curvature),
             step: resolution.step,
             tree,
             links: Vec::new(),
@@ -163,51 +190,68 @@ impl<'a> Search<'a> {
             .then(|| Joint { cost: self.cost.joint(piece, next), gear_changes: change })
     }
 
-    /// Adds what leads to a node.
+    /// Adds what leads to a node and may become better than the best.
     fn grow(&mut self, index: u32, node: &Node) {
-        for gear in [1.0, -1.0] {
-            for share in CURVATURES {
-                let unit = Piece::new(gear, share * self.problem.curvature);
-                // Going on is what longer arcs are for; going back along the same arc is idle.
-                #[allow(clippy::float_cmp)] // both are products of the same two numbers
-                let same = node.next.is_some_and(|(_, next)| next.curvature == unit.curvature);
-                let Some(joint) = self.joint(node, &unit).filter(|_| !same) else { continue };
+        let (place, units) = (self.bound.place(&node.pose), self.units);
+        for unit in &units {
+            // Going on is what longer arcs are for; going back along the same arc is idle.
+            let bend = unit.piece.curvature;
+            #[allow(clippy::float_cmp)] // both are products of the same two numbers
+            let same = node.next.is_some_and(|(_, next)| next.curvature == bend);
+            let Some(joint) = self.joint(node, &unit.piece).filter(|_| !same) else { continue };
+            let least = node.cost + joint.cost + self.bound.time_before(&place, bend, unit.first);
+            if least < self.best_cost() {
                 self.grow_along(index, node, unit, joint);
             }
         }
     }
 
     /// The poses along one arc that leads to a node, as far as it is clear.
-    fn grow_along(&mut self, index: u32, node: &Node, unit: Piece, joint: Joint) {
-        let mut reached = 0.0;
-        for steps in LENGTHS {
-            let length = f64::from(steps) * self.step;
-            if length * unit.curvature.abs() > core::f64::consts::PI {
-                return;
+    fn grow_along(&mut self, index: u32, node: &Node, unit: &Unit, joint: Joint) {
+        let lengths = LENGTHS.map(|steps| f64::from(steps) * self.step);
+        let bend = unit.piece.curvature.abs();
+        let most = lengths.partition_point(|length| length * bend <= core::f64::consts::PI);
+        let clear = self.clear_lengths(&node.pose, unit.piece, &lengths[..most]);
+        for length in &lengths[..clear] {
+            self.push_along(index, node, unit, *length, joint);
+        }
+        if clear < most {
+            let reached = reached(&lengths, clear);
+            let farthest = self.farthest(&node.pose, unit.piece, reached, lengths[clear]);
+            if farthest > reached + 0.1 * self.step {
+                self.push_along(index, node, unit, farthest, joint);
             }
-            if !self.is_clear(&node.pose, unit, reached, length) {
-                let farthest = self.farthest(&node.pose, unit, reached, length);
-                if farthest > reached + 0.1 * self.step {
-                    self.push_along(index, node, unit, farthest, joint);
-                }
-                return;
-            }
-            self.push_along(index, node, unit, length, joint);
-            reached = length;
         }
     }
 
-    fn push_along(&mut self, index: u32, node: &Node, unit: Piece, length: f64, joint: Joint) {
-        let piece = Piece::new(length * unit.length, unit.curvature);
+    /// How many of the lengths are clear. What is clear is so from the node on, so halving tells.
+    fn clear_lengths(&self, end: &Pose, unit: Piece, lengths: &[f64]) -> usize {
+        let (mut clear, mut blocked) = (0, lengths.len() + 1);
+        let mut tried = lengths.len();
+        while blocked - clear > 1 {
+            if self.is_clear(end, unit, reached(lengths, clear), lengths[tried - 1]) {
+                clear = tried;
+            } else {
+                blocked = tried;
+            }
+            tried = usize::midpoint(clear, blocked);
+        }
+        clear
+    }
+
+    fn push_along(&mut self, index: u32, node: &Node, unit: &Unit, length: f64, joint: Joint) {
+        let piece = Piece::new(length * unit.piece.length, unit.piece.curvature);
         let before = Node {
             pose: piece.start_before(&node.pose),
             cost: node.cost + joint.cost + self.cost.piece(&piece, node.next.is_none()),
             next: Some((index, piece)),
             gear_changes: node.gear_changes + joint.gear_changes,
         };
-        let estimate = before.cost + self.estimate(&before.pose);
-        if estimate < self.best_cost() {
-            self.tree.push(before, estimate);
+        let place = self.bound.place(&before.pose);
+        let least = before.cost + self.bound.time(&place, piece.curvature, unit.first);
+        if least < self.best_cost() {
+            let estimate = before.cost + self.estimate(&before.pose);
+            self.tree.push(before, estimate, least);
         }
     }
 
@@ -251,13 +295,17 @@ impl<'a> Search<'a> {
         self.links = links;
     }
 
-    /// Cost of the whole plan over a link; none where the gears forbid it.
+    /// Cost of the whole plan over a link; none where the gears forbid it or it is far too long.
     fn link_cost(&self, node: &Node, link: &Link) -> Option<f64> {
         let pieces = link.pieces();
         let Some(last) = pieces.last() else {
             let first = node.next.map_or(0.0, |(_, piece)| self.cost.first(&piece));
             return Some(node.cost + first);
         };
+        let length: f64 = pieces.iter().map(|piece| piece.length.abs()).sum();
+        if node.cost + self.cost.at_least(length) >= self.best_cost() {
+            return None;
+        }
         let joint = self.joint(node, last)?;
         let changes = gear_changes(pieces.iter().map(Piece::gear)) + joint.gear_changes;
         if node.gear_changes + changes > self.problem.gear_changes {
@@ -277,4 +325,9 @@ impl<'a> Search<'a> {
             self.clears(&back)
         })
     }
+}
+
+/// The last of so many lengths.
+fn reached(lengths: &[f64], count: usize) -> f64 {
+    count.checked_sub(1).map_or(0.0, |last| lengths[last])
 }

@@ -12,6 +12,9 @@ use kerbside_geometry::{Footprint, Pose, convex_distance, math};
 use crate::segment::Segment;
 use crate::world::{Edge, Nearest, Obstacle, World};
 
+/// What is clear by more than this needs no exact distance \[m\].
+const ROUNDING: f64 = 1e-9;
+
 /// The region a footprint covers along a segment.
 #[allow(clippy::large_enum_variant)] // made, asked and dropped on the stack, thousands of times
 pub(crate) enum Sweep {
@@ -54,6 +57,27 @@ impl Sweep {
         }
     }
 
+    /// A lower bound, quickly had, of the depth \[m\].
+    fn depth_at_least(&self, world: &World) -> f64 {
+        match self {
+            Self::Line(_) => f64::NEG_INFINITY,
+            Self::Turn(turn) => world.bounds.depth(&[turn.disc]) - turn.disc_radius,
+        }
+    }
+
+    /// Whether all of the sweep is at least so far beyond the line of one of the obstacle's edges: most obstacles that
+    /// are near are beside the car.
+    fn is_beyond_a_side(&self, obstacle: &Obstacle, distance: f64) -> bool {
+        obstacle.edges.iter().any(|edge| {
+            let outward = [edge.along[1], -edge.along[0]];
+            let enough = dot(edge.start, outward) + distance;
+            match self {
+                Self::Line(outline) => outline.iter().all(|corner| dot(*corner, outward) >= enough),
+                Self::Turn(turn) => turn.is_beyond(outward, enough),
+            }
+        })
+    }
+
     /// Least distance from everything solid along the segment \[m\], and from what; at most 0
     /// where the way touches something or leaves the bounds. It must not start inside an obstacle.
     pub(crate) fn clearance(&self, world: &World) -> (f64, Nearest) {
@@ -71,9 +95,12 @@ impl Sweep {
 
     /// Whether the clearance is at least `needed` \[m\], where it is so at the segment's start.
     pub(crate) fn stays_clear(&self, world: &World, needed: f64) -> bool {
-        self.depth(world) >= needed
+        let plainly = needed + ROUNDING;
+        (self.depth_at_least(world) >= plainly || self.depth(world) >= needed)
             && world.obstacles.iter().all(|obstacle| {
-                self.at_least(obstacle) >= needed || self.stays_clear_of(obstacle, needed)
+                self.at_least(obstacle) >= plainly
+                    || self.is_beyond_a_side(obstacle, plainly)
+                    || self.stays_clear_of(obstacle, needed)
             })
     }
 
@@ -149,6 +176,17 @@ impl Turn {
             return 0.0;
         }
         ends.min(self.corners_past(obstacle)).min(self.edges_past(solid))
+    }
+
+    /// Whether every corner stays beyond `enough` in a direction of length 1: at both ends and, where it turns back
+    /// there, in between.
+    fn is_beyond(&self, direction: [f64; 2], enough: f64) -> bool {
+        let centre = dot(self.centre, direction);
+        let ends = self.start.iter().chain(&self.end);
+        ends.copied().all(|corner| dot(corner, direction) >= enough)
+            && self.corners.iter().all(|arc| {
+                dot(arc.middle, direction) > -arc.half_cos || centre - arc.radius >= enough
+            })
     }
 
     fn stays_clear_of(&self, obstacle: &Obstacle, needed: f64) -> bool {

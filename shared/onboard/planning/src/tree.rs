@@ -2,7 +2,7 @@
 //! which are nearly the same.
 
 use std::collections::{BinaryHeap, HashMap};
-use std::hash::{BuildHasherDefault, DefaultHasher};
+use std::hash::{BuildHasherDefault, Hasher};
 
 use kerbside_geometry::{Pose, angle};
 
@@ -43,6 +43,7 @@ pub(crate) struct Node {
 #[derive(Clone, Copy, Debug)]
 struct Open {
     estimate: f64,
+    least: f64,
     node: u32,
 }
 
@@ -69,7 +70,40 @@ impl Eq for Open {}
 /// Nodes nearly the same: position, heading, gear changes and gear.
 type Cell = (i32, i32, i32, u32, i8);
 /// Never iterated over, and without a random seed.
-type Cells = HashMap<Cell, f64, BuildHasherDefault<DefaultHasher>>;
+type Cells = HashMap<Cell, f64, BuildHasherDefault<Mixed>>;
+
+/// A hash of the few small numbers of a cell, which nobody chooses to collide: each is multiplied in.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mixed(u64);
+
+impl Mixed {
+    fn mix(&mut self, word: u64) {
+        // The golden ratio's fraction; the turn brings what was carried upwards down again.
+        self.0 = (self.0.rotate_left(26) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+}
+
+impl Hasher for Mixed {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.mix(u64::from(*byte)));
+    }
+
+    fn write_i32(&mut self, number: i32) {
+        self.mix(u64::from(number.cast_unsigned()));
+    }
+
+    fn write_u32(&mut self, number: u32) {
+        self.mix(u64::from(number));
+    }
+
+    fn write_i8(&mut self, number: i8) {
+        self.mix(u64::from(number.cast_unsigned()));
+    }
+
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 32)
+    }
+}
 
 /// Nodes, open and closed.
 pub(crate) struct Tree {
@@ -85,8 +119,9 @@ impl Tree {
         Self { resolution, nodes, open, cells }
     }
 
-    /// Keeps a node unless one nearly the same costs no more.
-    pub(crate) fn push(&mut self, node: Node, estimate: f64) {
+    /// Keeps a node unless one nearly the same costs no more. It is opened in the order of `estimate`; a plan through
+    /// it costs no less than `least`.
+    pub(crate) fn push(&mut self, node: Node, estimate: f64, least: f64) {
         let cell = self.cell(&node);
         if self.cells.get(&cell).is_some_and(|cost| *cost <= node.cost) {
             return;
@@ -94,15 +129,18 @@ impl Tree {
         let Ok(index) = u32::try_from(self.nodes.len()) else { return };
         self.cells.insert(cell, node.cost);
         self.nodes.push(node);
-        self.open.push(Open { estimate, node: index });
+        self.open.push(Open { estimate, least, node: index });
     }
 
-    /// The open node of the least estimate, if that is below `limit`, which is then open no more.
+    /// The open node of the least estimate that may lead below `limit`, which is then open no more.
     pub(crate) fn pop(&mut self, limit: f64) -> Option<(u32, Node)> {
         loop {
-            let Open { estimate, node: index } = self.open.pop()?;
+            let Open { estimate, least, node: index } = self.open.pop()?;
             if estimate >= limit {
                 return None;
+            }
+            if least >= limit {
+                continue;
             }
             let node = self.nodes[index as usize];
             if self.cells.get(&self.cell(&node)).is_none_or(|cost| node.cost <= *cost) {
@@ -144,11 +182,12 @@ mod tests {
     fn the_cheapest_of_a_cell_is_opened_and_only_below_the_limit() {
         let mut tree = Tree::new(Resolution::halved(1.0, 0));
         let piece = Piece::new(0.5, 0.2);
-        tree.push(node(0.0, 0.0, None), 0.0);
-        tree.push(node(1.00, 5.0, Some((0, piece))), 6.0);
-        tree.push(node(1.01, 4.0, Some((0, piece))), 5.0);
-        tree.push(node(1.02, 4.5, Some((0, piece))), 5.5);
-        tree.push(node(3.0, 1.0, Some((2, piece))), 9.0);
+        let push = |tree: &mut Tree, node: Node, estimate| tree.push(node, estimate, estimate);
+        push(&mut tree, node(0.0, 0.0, None), 0.0);
+        push(&mut tree, node(1.00, 5.0, Some((0, piece))), 6.0);
+        push(&mut tree, node(1.01, 4.0, Some((0, piece))), 5.0);
+        push(&mut tree, node(1.02, 4.5, Some((0, piece))), 5.5);
+        push(&mut tree, node(3.0, 1.0, Some((2, piece))), 9.0);
         let order: Vec<f64> =
             core::iter::from_fn(|| tree.pop(8.0)).map(|(_, node)| node.pose.x).collect();
         assert_eq!(order, [0.0, 1.01]);
