@@ -16,6 +16,8 @@ pub struct Answer {
     pub verdict: String,
     /// Links.
     pub links: Vec<String>,
+    /// Links that moved before any effect was fitted, at most two.
+    pub moved: Vec<String>,
     /// Effects.
     pub effects: Vec<Found>,
     /// The 90 % set: names, sorted, and probability.
@@ -73,8 +75,9 @@ impl Answer {
             return Err(format!("the verdict is {verdict:?}"));
         }
         let links = words(&document["where"]);
+        let moved = words(&document["moved"]);
         let known = |name: &String| Link::ALL.iter().any(|link| link.name() == name);
-        if let Some(name) = links.iter().find(|name| !known(name)) {
+        if let Some(name) = links.iter().chain(&moved).find(|name| !known(name)) {
             return Err(format!("no link is called {name:?}"));
         }
         let list = |name: &str| {
@@ -95,7 +98,7 @@ impl Answer {
         };
         let ranking = document["ranking"].as_array().into_iter().flatten().filter_map(rival);
         let ranking = ranking.collect();
-        let answer = Self { verdict, links, effects, alternatives, ranking };
+        let answer = Self { verdict, links, moved, effects, alternatives, ranking };
         answer.contradiction().map_or(Ok(answer), Err)
     }
 

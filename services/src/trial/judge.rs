@@ -28,6 +28,8 @@ pub struct Row {
     pub set: bool,
     /// Right links.
     pub link: bool,
+    /// Every right link is among those that moved before any effect was fitted; of a case without effects, none moved.
+    pub moved: bool,
     /// Errors of parameters, relative, beyond the spread of what was put in; of effects that were named rightly.
     pub errors: Vec<(String, f64)>,
     /// Whether each is within its interval, widened by that spread.
@@ -57,6 +59,8 @@ pub fn judge(case: &str, label: &Label, answer: Option<&Answer>) -> Row {
     row.verdict = Some(answer.verdict.clone());
     row.named = answer.ids();
     row.link = links(label, &answer.links) == links(label, &label.links);
+    let (right, moved) = (links(label, &label.links), links(label, &answer.moved));
+    row.moved = if right.is_empty() { moved.is_empty() } else { right.is_subset(&moved) };
     row.stated = answer.stated();
     match label.kind.as_str() {
         "null" => row.exact = answer.verdict == "none",
@@ -126,4 +130,31 @@ fn scale(truth: &Truth, name: &str, value: f64) -> f64 {
         _ => (value - neutral(name)).abs(),
     };
     if scale > 0.0 { scale } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(words: &[&str]) -> Vec<String> {
+        words.iter().map(|word| (*word).to_owned()).collect()
+    }
+
+    #[test]
+    fn links_moved_where_they_hold_the_right_one_and_in_good_order_where_there_is_none() {
+        let moved = |kind: &str, right: &[&str], said: &[&str]| {
+            let label = Label {
+                kind: kind.to_owned(),
+                links: named(right),
+                sensors: "cws".to_owned(),
+                ..Label::default()
+            };
+            let answer = Answer { moved: named(said), ..Answer::default() };
+            judge("case", &label, Some(&answer)).moved
+        };
+        assert!(moved("single", &["ground"], &["sensing", "ground"]));
+        assert!(!moved("single", &["ground"], &["sensing", "steering_actuation"]));
+        assert!(!moved("single", &["ground"], &[]));
+        assert!(moved("null", &[], &[]) && !moved("null", &[], &["sensing"]));
+    }
 }

@@ -73,11 +73,14 @@ fn kinds(score: &Score) -> Table {
     let mut table = tables::figures(&["", "right", "%", "95 %"], &[1, 2]);
     let share =
         |kind: &'static [&'static str], of: fn(&Row) -> bool| Share::count(score.of(kind).map(of));
-    let (single, pair, unknown) = (&["single"][..], &["pair"][..], &["unknown"][..]);
+    let [single, pair, null, unknown]: [&'static [&'static str]; 4] =
+        [&["single"], &["pair"], &["null"], &["unknown"]];
     for (name, share) in [
         ("single: effect", share(single, |row| row.exact)),
         ("single: effect, or among three", share(single, |row| row.set)),
         ("single: link", share(single, |row| row.link)),
+        ("single: link among those that moved", share(single, |row| row.moved)),
+        ("null: no link moved", share(null, |row| row.moved)),
         ("pair: both", share(pair, |row| row.exact)),
         ("pair: both, or among three", share(pair, |row| row.set)),
         ("null: false alarms", score.false_alarms()),
@@ -194,7 +197,7 @@ fn document(score: &Score, facts: &Facts<'_>, passed: bool) -> Value {
         json!({
             "case": row.case, "kind": row.label.kind, "truth": row.label.ids(), "size": row.label.size,
             "verdict": row.verdict, "answer": row.named, "exact": row.exact, "set": row.set,
-            "link": row.link, "probability": row.stated, "on_truth": row.on_truth,
+            "link": row.link, "moved": row.moved, "probability": row.stated, "on_truth": row.on_truth,
             "removed": row.removed, "seconds": row.seconds,
         })
     };
@@ -211,6 +214,8 @@ fn document(score: &Score, facts: &Facts<'_>, passed: bool) -> Value {
         "link": of(&["single"], |row| row.link),
         "effect": of(&["single"], |row| row.exact),
         "effect_or_set": of(&["single"], |row| row.set),
+        "link_moved": of(&["single"], |row| row.moved),
+        "null_unmoved": of(&["null"], |row| row.moved),
         "pair_both": of(&["pair"], |row| row.exact),
         "unknown_flagged": as_json(score.unknown_flagged()),
         "false_unknown": as_json(score.false_unknown()),

@@ -227,6 +227,11 @@ impl Score {
                 0.95,
             ),
             least(
+                "right link moved before any fit, d >= 10",
+                Share::count(singles().map(|row| row.moved)),
+                0.95,
+            ),
+            least(
                 "both of a pair, d >= 10",
                 Share::count(self.large(&["pair"]).map(|row| row.exact)),
                 0.85,

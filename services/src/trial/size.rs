@@ -306,6 +306,15 @@ mod tests {
     }
 
     #[test]
+    fn an_effect_that_a_vehicle_in_good_order_may_have_is_no_larger_than_its_allowance_says() {
+        let mut case = case("gyro_bias", 0.1);
+        let bias = case.specification.effects[0].get("bias").abs();
+        case.specification.uncertainty.effects = vec![("gyro_bias", "bias", bias / 3.0)];
+        let size = of(&case);
+        assert!(size > 2.0 && size <= 3.0 + 1e-6, "{size}");
+    }
+
+    #[test]
     fn a_case_in_good_order_has_no_size_and_an_effect_that_acts_nowhere_none_to_speak_of() {
         assert!(sizes(&Case::draw(3, Kind::Null), &Simulated).is_empty());
         let mut case = case("floor_patch", 0.3);

@@ -8,7 +8,8 @@ use crate::insertions::Effect;
 impl Case {
     /// One case for each thing that the description may be wrong by, with its name: the true vehicle deviates in it by one
     /// standard deviation more. The differences of what they record without noise are what such an uncertainty explains.
-    /// Parameters of what is put in are left out: they have no further deviation.
+    /// Where the description leaves open what is put in as well, that deviates, too: so much of it a vehicle in good order
+    /// may have.
     #[must_use]
     pub fn deviations(&self) -> Vec<(String, Self)> {
         let uncertainty = &self.specification.uncertainty;
@@ -25,8 +26,7 @@ impl Case {
                 out.push(((*field).to_owned(), self.with_field(field, *deviation)));
             }
         }
-        let put_in = |id: &str| self.specification.effects.iter().any(|effect| effect.id == id);
-        for (id, name, deviation) in uncertainty.effects.iter().filter(|known| !put_in(known.0)) {
+        for (id, name, deviation) in &uncertainty.effects {
             out.push((format!("{id}.{name}"), self.with_habit(id, name, *deviation)));
         }
         out
@@ -50,10 +50,11 @@ impl Case {
 
     fn with_habit(&self, id: &'static str, name: &'static str, deviation: f64) -> Self {
         let mut case = self.clone();
-        let habits = &mut case.specification.habits;
         let moved = Effect::new(id, &[]).get(name) + deviation;
-        let Some(habit) = habits.iter_mut().find(|habit| habit.id == id) else {
-            habits.push(Effect::new(id, &[(name, moved)]));
+        let of = &mut case.specification;
+        let mut known = of.effects.iter_mut().chain(&mut of.habits);
+        let Some(habit) = known.find(|habit| habit.id == id) else {
+            of.habits.push(Effect::new(id, &[(name, moved)]));
             return case;
         };
         match habit.values.iter_mut().find(|value| value.0 == name) {
