@@ -48,6 +48,7 @@ pub fn of(found: &Diagnosis, facts: &Facts<'_>) -> Value {
         "effects": found.effects.iter().map(effect).collect::<Vec<_>>(),
         "alternatives": found.alternatives.iter().map(alternative).collect::<Vec<_>>(),
         "ranking": found.ranking.iter().map(pair).collect::<Vec<_>>(),
+        "unseen": found.unseen,
         "rivals": found.ranking.iter().map(gain).collect::<Vec<_>>(),
         "mistake": found.mistake.as_ref().map(|mistake| json!({ "kind": mistake.kind, "detail": mistake.detail })),
         "links": found.links.iter().map(link).collect::<Vec<_>>(),

@@ -54,6 +54,7 @@ fn nothing() -> Diagnosis {
         moved: Vec::new(),
         effects: Vec::new(),
         alternatives: Vec::new(),
+        unseen: 0.04,
         ranking: vec![rival("none", 0.97), rival("gyro_gain", 0.02)],
         mistake: None,
         links: links(),
@@ -87,6 +88,7 @@ pub fn two_effects() -> Diagnosis {
         moved: vec![Link::SpeedActuation, Link::Sensing],
         effects: vec![loss, gain],
         alternatives: vec![Alternative { ids: vec!["count_loss", "speed_gain"], probability: 0.96 }],
+        unseen: 0.0,
         ranking: vec![rival("count_loss + speed_gain", 0.96), rival("unknown", 0.01)],
         gap: Some(Shrinkage {
             before: 0.198,
@@ -117,6 +119,7 @@ pub fn ambiguous() -> Diagnosis {
             &[("limit", "m/s2", open)],
         )],
         alternatives: vec![set("acceleration_limit", 0.5), set("speed_lag", 0.44)],
+        unseen: 0.0,
         ranking: vec![rival("acceleration_limit", 0.5), rival("speed_lag", 0.44)],
         next: Some(Next {
             manoeuvre: "circle with steps of the speed, small and large".to_owned(),
@@ -135,6 +138,7 @@ pub fn of_every_verdict() -> Vec<Diagnosis> {
         sentence: "The car turns in by itself, and nothing that is listed does so.".to_owned(),
         links_named: vec![Link::Ground],
         moved: vec![Link::Ground],
+        unseen: 0.0,
         ranking: vec![rival("unknown", 0.9)],
         ..nothing()
     };

@@ -56,6 +56,10 @@ fn page(diagnosed: &Diagnosed) -> String {
         let name = if index == 0 { "which" } else { "" };
         say(name, &format!("{:6}  {}", format::probability(rival.probability), rival.name));
     }
+    if found.unseen > 0.0 {
+        let words = "another effect beside it, too small for these runs";
+        say("", &format!("{:6}  {words}", format::probability(found.unseen)));
+    }
     for effect in &found.effects {
         say("size", &sizes(effect));
     }

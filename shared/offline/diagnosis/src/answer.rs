@@ -63,7 +63,7 @@ pub(crate) fn effects(found: &Found<'_>, search: &Search<'_>) -> Vec<FoundEffect
                     .iter()
                     .any(|c| search.candidates[*c].definition.id == own.definition.id)
             })
-            .map(|set| set.probability)
+            .map(|set| set.probability + set.unseen)
             .sum::<f64>()
             .min(1.0);
         effects.push(FoundEffect {
@@ -161,7 +161,9 @@ pub(crate) fn next(
 ) -> Option<Next> {
     let decision = found.decision;
     let uncertain = decision.answer > 1
-        || (decision.answer == 1 && decision.sets.len() > 1 && decision.sets[0].probability < 0.95);
+        || (decision.answer == 1
+            && decision.sets.len() > 1
+            && decision.sets[0].probability + decision.sets[0].unseen < 0.95);
     let [first, second] = [decision.sets.first()?, decision.sets.get(1)?];
     if !uncertain {
         return None;

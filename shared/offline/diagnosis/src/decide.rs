@@ -37,7 +37,10 @@ const LARGEST: usize = 3;
 pub(crate) struct Weighed {
     /// Index among the analysis's fits.
     pub fit: usize,
+    /// Probability of exactly these.
     pub probability: f64,
+    /// Probability that these act with another beside them that the runs would not show.
+    pub unseen: f64,
 }
 
 /// Probabilities of everything.
@@ -90,7 +93,11 @@ pub(crate) fn decide(found: &Analysis<'_>) -> Decision {
     let none = math::exp(math::ln(NONE) - highest);
     let mut weighed: Vec<Weighed> = sets
         .iter()
-        .map(|(fit, weight)| Weighed { fit: *fit, probability: math::exp(weight - highest) })
+        .map(|(fit, weight)| Weighed {
+            fit: *fit,
+            probability: math::exp(weight - highest),
+            unseen: 0.0,
+        })
         .collect();
     let mut links: Vec<(Link, f64)> = Link::ALL.into_iter().map(|link| (link, 0.0)).collect();
     for (beside, weight) in &shapes {
@@ -132,7 +139,8 @@ pub(crate) fn temper(found: &Analysis<'_>) -> f64 {
 
 /// The answer that the probabilities give.
 pub(crate) fn answer(decision: &mut Decision) {
-    let listed: f64 = decision.sets.iter().map(|w| w.probability).sum();
+    let named: f64 = decision.sets.iter().map(|w| w.probability).sum();
+    let listed = named + decision.sets.iter().map(|w| w.unseen).sum::<f64>();
     if decision.none >= listed && decision.none >= decision.unknown {
         decision.verdict = Verdict::None;
         return;
@@ -143,13 +151,19 @@ pub(crate) fn answer(decision: &mut Decision) {
     }
     let mut reached = 0.0;
     for weighed in decision.sets.iter().take(LARGEST) {
-        if reached >= SET * listed {
+        if reached >= SET * named {
             break;
         }
         reached += weighed.probability;
         decision.answer += 1;
     }
     decision.verdict = if decision.answer == 1 { Verdict::Effects } else { Verdict::Ambiguous };
+}
+
+/// By how much a given pair with an effect is less likely beforehand than that effect alone.
+pub(crate) fn beside_single(found: &Analysis<'_>) -> f64 {
+    let names = distinct(found);
+    (PAIR / (0.5 * names * (names - 1.0))) / (SINGLE / names)
 }
 
 /// How many effects the library has.

@@ -20,6 +20,7 @@ use crate::pictures;
 use crate::prepare::Ready;
 use crate::shrink;
 use crate::trust;
+use crate::unseen;
 use crate::verdict::{Diagnosis, FoundEffect, Mistake, Rival, Verdict};
 use crate::words;
 
@@ -85,6 +86,7 @@ pub fn diagnose(
     let mut decision = decide(&found);
     let search = Search { bench: &found.bench, candidates: &found.candidates };
     trust::distrust(&found, &search, &mut decision);
+    unseen::account(&found, &search, &mut decision);
     let mut told = told(
         case,
         &Found { analysis: &found, decision: &decision, nuisances: &differ },
@@ -139,6 +141,7 @@ fn told(
         moved: moved::moved(&search, &analysis.beside_nothing).iter().map(|(l, _)| *l).collect(),
         alternatives: answer::alternatives(found),
         effects,
+        unseen: if named { decision.sets[0].unseen } else { 0.0 },
         ranking: ranking(found, &search, &rivals),
         mistake,
         links: chain,

@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
+use crate::candidate::Candidate;
 use crate::fit::Search;
 
 /// Sizes of the noise at which an effect is seen.
-const SEEN: f64 = 5.0;
+pub(crate) const SEEN: f64 = 5.0;
 /// Sizes of the noise below which an effect of ordinary size is not excited.
 const EXCITED: f64 = 3.0;
 
@@ -35,13 +36,15 @@ pub(crate) fn gauge(search: &Search<'_>) -> Vec<Gauge> {
     gauges
 }
 
+/// Where an effect of ordinary size is looked at; none of one whose place comes from the map.
+pub(crate) fn middle(candidate: &Candidate) -> Option<Vec<f64>> {
+    candidate.starts.get(candidate.starts.len() / 2).cloned()
+}
+
 fn one(search: &Search<'_>, candidate: usize) -> Option<Gauge> {
     let own = &search.candidates[candidate];
     let id = own.definition.id;
-    let begin = match id {
-        "floor_patch" => return None,
-        _ => own.starts.get(own.starts.len() / 2)?.clone(),
-    };
+    let begin = middle(own)?;
     let projection = search.projection(&[candidate], &search.bench.all())?;
     let fit = search.fit(&[candidate], core::slice::from_ref(&begin), &projection, 1);
     let mut best = f64::INFINITY;

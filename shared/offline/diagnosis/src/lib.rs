@@ -30,6 +30,7 @@ mod screen;
 mod search;
 mod shrink;
 mod trust;
+mod unseen;
 mod verdict;
 mod words;
 

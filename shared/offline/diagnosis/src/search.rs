@@ -160,8 +160,8 @@ fn moved_about(search: &Search<'_>, mut best: Fit, projection: &Projection) -> F
     best
 }
 
-/// Directions of a patch's x, y and radius.
-const COMPASS: [[f64; 3]; 14] = [
+/// Directions of a patch's x, y and radius; one that grows or shrinks aslant keeps an edge where it is.
+const COMPASS: [[f64; 3]; 18] = [
     [1.0, 0.0, 0.0],
     [-1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],
@@ -176,6 +176,10 @@ const COMPASS: [[f64; 3]; 14] = [
     [-0.7, 0.0, 0.7],
     [0.0, 0.7, 0.7],
     [0.0, -0.7, 0.7],
+    [0.7, 0.0, -0.7],
+    [-0.7, 0.0, -0.7],
+    [0.0, 0.7, -0.7],
+    [0.0, -0.7, -0.7],
 ];
 
 /// Places along the paths, spread evenly.

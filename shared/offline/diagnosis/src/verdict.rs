@@ -215,6 +215,9 @@ pub struct Diagnosis {
     pub effects: Vec<FoundEffect>,
     /// The 90 % set.
     pub alternatives: Vec<Alternative>,
+    /// Probability that another effect acts beside the answer's that is too small for these runs; it is part of no
+    /// alternative.
+    pub unseen: f64,
     /// Every rival worth showing, likeliest first.
     pub ranking: Vec<Rival>,
     /// The mistake, where the verdict is one.

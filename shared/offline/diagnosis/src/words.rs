@@ -44,7 +44,7 @@ pub(crate) fn sentence(diagnosis: &Diagnosis, decision: &Decision) -> String {
         }
         Verdict::Effects => {
             let names: Vec<String> = diagnosis.effects.iter().map(effect).collect();
-            let probability = decision.sets.first().map_or(0.0, |set| set.probability);
+            let probability = decision.sets.first().map_or(0.0, |set| set.probability + set.unseen);
             format!("{} ({}){removed}.", names.join(" and "), percent(probability))
         }
         Verdict::Ambiguous => {

@@ -77,6 +77,10 @@ impl DiagnoseReport {
         };
         let next = diagnosis.ranking.iter().find(|rival| !chosen(&rival.name));
         let rival = next.map(|rival| (plain(&rival.name), probability(rival.probability)));
+        let unseen = format!(
+            "That another effect, too small for these runs, acts beside it has a probability of {}.",
+            probability(diagnosis.unseen)
+        );
         Some(match (diagnosis.verdict, rival) {
             (Verdict::None, _) => "An effect larger than the sizes below would have been seen.".to_owned(),
             (Verdict::Unknown, _) => {
@@ -89,9 +93,11 @@ impl DiagnoseReport {
                 "More of the same runs will not decide; the manoeuvre below will.".to_owned()
             }
             (Verdict::Effects, Some((name, probability))) => {
-                format!("The verdict's nearest rival is {name}, at a probability of {probability}.")
+                format!(
+                    "The verdict's nearest rival is {name}, at a probability of {probability}. {unseen}"
+                )
             }
-            (Verdict::Effects, None) => return None,
+            (Verdict::Effects, None) => unseen,
         })
     }
 }

@@ -156,6 +156,7 @@ fn diagnosis() -> Diagnosis {
             effect("speed_gain", Link::SpeedActuation, "gain", "", between(0.951, 0.004)),
         ],
         alternatives: vec![Alternative { ids: vec!["steering_offset", "speed_gain"], probability: 0.96 }],
+        unseen: 0.04,
         ranking: vec![
             rival("steering_offset + speed_gain", 0.96, 5_200.0, 1),
             rival("steering_offset + acceleration_slip", 0.025, 4_600.0, 2),
@@ -232,6 +233,7 @@ pub(crate) fn ambiguous() -> DiagnoseReport {
         moved: vec![Link::Ground],
         effects: vec![gradient],
         alternatives: vec![set("understeer", 0.55), set("steering_compliance", 0.41)],
+        unseen: 0.0,
         ranking: vec![
             rival("understeer", 0.55, 900.0, 1),
             rival("steering_compliance", 0.41, 896.0, 2),
@@ -273,6 +275,7 @@ pub(crate) fn no_gap() -> DiagnoseReport {
         moved: Vec::new(),
         effects: Vec::new(),
         alternatives: Vec::new(),
+        unseen: 0.0,
         ranking: vec![rival("none", 0.96, 0.0, 1), rival("gyro_gain", 0.03, 2.0, 2)],
         links: links.map(|(of, unit, sizes)| link(of, "", unit, sizes)).into(),
         gap: Some(Shrinkage {
@@ -305,6 +308,7 @@ pub(crate) fn unknown() -> DiagnoseReport {
         moved: vec![Link::Ground],
         effects: Vec::new(),
         alternatives: vec![Alternative { ids: vec!["lateral_drift"], probability: 0.05 }],
+        unseen: 0.0,
         ranking: vec![Rival { left_out: Vec::new(), ..rival("unknown", f64::NAN, f64::NAN, 3) }],
         gap: None,
         horizons: vec![(0.0, f64::NAN, 0.0, 0.0)],
@@ -323,6 +327,7 @@ pub(crate) fn mistaken() -> DiagnoseReport {
         moved: vec![Link::Sensing],
         effects: Vec::new(),
         alternatives: Vec::new(),
+        unseen: 0.0,
         ranking: Vec::new(),
         mistake: Some(Mistake {
             kind: "sign",
