@@ -6,8 +6,8 @@ use core::time::Duration;
 
 use kerbside_geometry::{Vehicle, math};
 use kerbside_messages::{
-    Cause, EstimatorState, Mode, Nanos, Odometry, OperatorAnswer, PlanAnswer, PlanVerdict, Process,
-    State, text,
+    Cause, EstimatorState, FixVerdict, Mode, Nanos, Odometry, OperatorAnswer, PlanAnswer,
+    PlanVerdict, Process, State, text,
 };
 
 /// Nothing the operator waits for may take longer than this.
@@ -98,12 +98,32 @@ impl core::fmt::Display for End {
     }
 }
 
+/// Fixes that an estimate has taken: as jumps, and as the newest that was judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Taken {
+    resets: u32,
+    fix_sequence: u64,
+}
+
+impl Taken {
+    fn of(odometry: &Odometry) -> Self {
+        Self { resets: odometry.resets, fix_sequence: odometry.fix_sequence }
+    }
+
+    /// Whether the estimate has taken one since: a pose that a fix corrects does not jump.
+    fn is_followed_by(self, odometry: &Odometry) -> bool {
+        let verdict = FixVerdict::from_code(odometry.fix_verdict);
+        let accepted = matches!(verdict, Some(FixVerdict::Accepted | FixVerdict::Widened));
+        odometry.resets != self.resets || accepted && odometry.fix_sequence != self.fix_sequence
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// The stack comes up, or recovers from a fault.
     Waiting,
     /// A fix was published.
-    Fixing { resets: u32 },
+    Fixing { before: Taken },
     /// An arm was asked for.
     Arming,
     /// A plan was asked for under this arm.
@@ -170,7 +190,7 @@ impl Manoeuvre {
         }
         match self.phase {
             Phase::Waiting => self.waiting(now, state, seen),
-            Phase::Fixing { resets } => self.fixing(now, resets, seen),
+            Phase::Fixing { before } => self.fixing(now, before, seen),
             Phase::Arming => self.arming(now, state, seen),
             Phase::Planning { arm, planner_restarts, refused } => {
                 self.planning(now, state, (arm, planner_restarts, refused), seen)
@@ -224,7 +244,7 @@ impl Manoeuvre {
             return self.overdue(now, "the vehicle does not come to rest");
         }
         if !self.fixed {
-            self.enter(now, Phase::Fixing { resets: odometry.resets });
+            self.enter(now, Phase::Fixing { before: Taken::of(odometry) });
             self.asked = Some(now);
             return Act::Fix;
         }
@@ -246,9 +266,9 @@ impl Manoeuvre {
         Act::Watch
     }
 
-    fn fixing(&mut self, now: Nanos, resets: u32, seen: &Observation<'_>) -> Act {
+    fn fixing(&mut self, now: Nanos, before: Taken, seen: &Observation<'_>) -> Act {
         let taken = |odometry: &Odometry| {
-            odometry.resets != resets && odometry.state == EstimatorState::Valid.code()
+            before.is_followed_by(odometry) && odometry.state == EstimatorState::Valid.code()
         };
         if seen.odometry.is_some_and(taken) {
             self.fixed = true;
@@ -433,5 +453,46 @@ pub fn cause_of(state: &State) -> String {
         Some(cause) if words.is_empty() => cause.name().to_owned(),
         Some(cause) => format!("{cause}: {words}"),
         None => "unknown".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(resets: u32, fix_sequence: u64, verdict: FixVerdict) -> Odometry {
+        let (state, fix_verdict) = (EstimatorState::Valid.code(), verdict.code());
+        let mut odometry = Odometry { resets, fix_sequence, fix_verdict, ..Odometry::default() };
+        (odometry.state, odometry.standstill) = (state, 1);
+        odometry
+    }
+
+    /// What the operator does after its fix, when the estimate becomes `after`.
+    fn after_a_fix(after: &Odometry) -> Act {
+        let before = estimate(1, 7, FixVerdict::Accepted);
+        let mut state = State { healthy: 1, ..State::default() };
+        state.mode = Mode::Ready.code();
+        let mut manoeuvre = Manoeuvre::new(1, &Vehicle::paper_car(), true);
+        let mut step = |now, odometry| {
+            state.header.sequence += 1;
+            let seen = Observation {
+                state: Some(&state),
+                odometry: Some(odometry),
+                ..Observation::default()
+            };
+            manoeuvre.step(now, &seen)
+        };
+        assert_eq!(step(2, &before), Act::Fix);
+        assert_eq!(step(3, &before), Act::Watch);
+        step(4, after)
+    }
+
+    #[test]
+    fn a_fix_that_sets_the_pose_and_one_that_corrects_it_are_taken() {
+        assert_eq!(after_a_fix(&estimate(2, 1, FixVerdict::Accepted)), Act::Arm);
+        assert_eq!(after_a_fix(&estimate(1, 1, FixVerdict::Accepted)), Act::Arm);
+        assert_eq!(after_a_fix(&estimate(2, 1, FixVerdict::Widened)), Act::Arm);
+        assert_eq!(after_a_fix(&estimate(1, 8, FixVerdict::Moving)), Act::Watch);
+        assert_eq!(after_a_fix(&estimate(1, 7, FixVerdict::Accepted)), Act::Watch);
     }
 }

@@ -1,6 +1,7 @@
 //! What stands in for shared memory and the serial line: the same seals and checks, in one thread.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use kerbside_messages::{Admission, Admitted, Message, Nanos, Process, Refusals, seal};
 
@@ -15,7 +16,7 @@ const NEWEST: usize = 64;
 #[cfg(test)]
 pub type Forge<M> = Box<dyn FnMut(Nanos, &mut M) + Send>;
 
-/// A topic with one publisher and its readers.
+/// A topic with one publisher and its readers, who share what nothing befalls.
 pub struct Topic<M: Message> {
     epoch: u64,
     sequence: u64,
@@ -66,22 +67,23 @@ impl<M: Message> Topic<M> {
     }
 
     /// Lets `fill` write a sample; it is sealed at `now`, and on its way.
-    pub fn send(&mut self, now: Nanos, fill: impl FnOnce(&mut M) -> bool) -> Option<M> {
-        let mut message = M::default();
-        if !fill(&mut message) {
+    pub fn send(&mut self, now: Nanos, fill: impl FnOnce(&mut M) -> bool) -> Option<Arc<M>> {
+        let mut message = Arc::new(M::default());
+        let sample = Arc::get_mut(&mut message)?;
+        if !fill(sample) {
             return None;
         }
         #[cfg(test)]
         if let Some(forge) = &mut self.forge {
-            forge(now, &mut message);
+            forge(now, sample);
         }
         self.sequence += 1;
-        seal(&mut message, &[], self.epoch, self.sequence, now);
+        seal(sample, &[], self.epoch, self.sequence, now);
         self.deliver(now, &message);
         Some(message)
     }
 
-    fn deliver(&mut self, now: Nanos, message: &M) {
+    fn deliver(&mut self, now: Nanos, message: &Arc<M>) {
         if !self.passing.is_empty() {
             self.passing.retain(|passing| passing.until > now);
         }
@@ -89,8 +91,10 @@ impl<M: Message> Topic<M> {
             let concerned =
                 self.passing.iter_mut().find(|passing| passing.reader == reader.process);
             match concerned {
-                Some(passing) => passing.pass(now, message, |due, sample| reader.put(due, sample)),
-                None => reader.put(now, message),
+                Some(passing) => {
+                    passing.pass(now, message, |due, sample| reader.put(due, Arc::new(*sample)));
+                }
+                None => reader.put(now, Arc::clone(message)),
             }
         }
     }
@@ -101,7 +105,7 @@ impl<M: Message> Topic<M> {
     }
 
     /// The next sample for a reader of every one.
-    pub fn take(&mut self, process: Process, now: Nanos) -> Option<(M, Admitted)> {
+    pub fn take(&mut self, process: Process, now: Nanos) -> Option<(Arc<M>, Admitted)> {
         self.reader(process)?.take(now)
     }
 
@@ -112,7 +116,7 @@ impl<M: Message> Topic<M> {
 
     /// The newest sample that a reader has taken in.
     pub fn newest(&self, process: Process) -> Option<&M> {
-        self.readers.iter().find(|reader| reader.process == process)?.newest.as_ref()
+        self.readers.iter().find(|reader| reader.process == process)?.newest.as_deref()
     }
 
     /// What a reader refused.
@@ -127,8 +131,8 @@ impl<M: Message> Topic<M> {
 pub struct Reader<M: Message> {
     process: Process,
     admission: Admission<M>,
-    queue: VecDeque<(Nanos, M)>,
-    newest: Option<M>,
+    queue: VecDeque<(Nanos, Arc<M>)>,
+    newest: Option<Arc<M>>,
 }
 
 impl<M: Message> Reader<M> {
@@ -136,17 +140,17 @@ impl<M: Message> Reader<M> {
         Self { process, admission: Admission::default(), queue: VecDeque::new(), newest: None }
     }
 
-    fn put(&mut self, due: Nanos, message: &M) {
+    fn put(&mut self, due: Nanos, message: Arc<M>) {
         let in_order = matches!(M::TOPIC.delivery, kerbside_messages::Delivery::InOrder { .. });
         let depth = if in_order { IN_ORDER } else { NEWEST };
         if self.queue.len() >= depth {
             self.queue.pop_front();
         }
-        self.queue.push_back((due, *message));
+        self.queue.push_back((due, message));
     }
 
     /// The next sample that has come and may be used.
-    fn take(&mut self, now: Nanos) -> Option<(M, Admitted)> {
+    fn take(&mut self, now: Nanos) -> Option<(Arc<M>, Admitted)> {
         loop {
             let message = self.arrived(now)?;
             if let Ok(admitted) = self.admission.admit(&message, &[], now) {
@@ -156,8 +160,8 @@ impl<M: Message> Reader<M> {
     }
 
     /// The next sample that has come: what is late lets others pass.
-    fn arrived(&mut self, now: Nanos) -> Option<M> {
-        let due = |(due, _): &(Nanos, M)| *due;
+    fn arrived(&mut self, now: Nanos) -> Option<Arc<M>> {
+        let due = |(due, _): &(Nanos, Arc<M>)| *due;
         let first = self.queue.iter().map(due).min().filter(|first| *first <= now)?;
         let index = self.queue.iter().position(|waiting| waiting.0 == first)?;
         self.queue.remove(index).map(|(_, message)| message)
@@ -211,7 +215,11 @@ impl ByteQueue {
         out.clear();
         while self.is_due(now) {
             let Some((_, length)) = self.pieces.pop_front() else { return };
-            out.extend(self.bytes.drain(..length));
+            let (front, back) = self.bytes.as_slices();
+            let in_front = length.min(front.len());
+            out.extend_from_slice(&front[..in_front]);
+            out.extend_from_slice(&back[..length - in_front]);
+            self.bytes.drain(..length);
         }
     }
 }

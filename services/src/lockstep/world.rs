@@ -5,6 +5,7 @@ mod faults;
 mod processes;
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use kerbside_messages::{
     Actuator, Command, Fix, Heartbeat, Inhibit, Nanos, Odometry, OperatorAnswer, Permit, Plan,
@@ -91,7 +92,8 @@ pub struct World {
     buffer: Vec<u8>,
     stages: Stages,
     topics: Topics,
-    slots: Vec<Slot>,
+    /// By the process's number.
+    slots: [Slot; Process::ALL.len()],
     starting: VecDeque<(Nanos, Process, u32)>,
     /// Deaths that the supervisor has not been told of.
     deaths: VecDeque<(Process, Exit)>,
@@ -122,24 +124,33 @@ pub struct World {
 }
 
 /// What the newest tick published.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Fresh {
     /// Reading.
-    pub raw: Option<Raw>,
+    pub raw: Option<Arc<Raw>>,
     /// Estimate.
-    pub odometry: Option<Odometry>,
+    pub odometry: Option<Arc<Odometry>>,
     /// Command.
-    pub command: Option<Command>,
+    pub command: Option<Arc<Command>>,
     /// What passed the gate.
-    pub actuator: Option<Actuator>,
+    pub actuator: Option<Arc<Actuator>>,
     /// What the interface wrote to the line.
     pub delivered: Option<Actuator>,
     /// Permit.
-    pub permit: Option<Permit>,
+    pub permit: Option<Arc<Permit>>,
     /// State.
-    pub state: Option<State>,
+    pub state: Option<Arc<State>>,
     /// Truth.
     pub truth: Option<Truth>,
+}
+
+impl Fresh {
+    /// Another tick begins.
+    fn clear(&mut self) {
+        (self.raw, self.odometry, self.command) = (None, None, None);
+        (self.actuator, self.delivered, self.permit) = (None, None, None);
+        (self.state, self.truth) = (None, None);
+    }
 }
 
 impl World {
@@ -170,7 +181,7 @@ impl World {
             buffer: Vec::new(),
             stages: Stages::default(),
             topics: Topics::new(&supervised),
-            slots: supervised.iter().map(|supervised| Slot::new(supervised.process)).collect(),
+            slots: Process::ALL.map(Slot::new),
             starting: VecDeque::new(),
             deaths: VecDeque::new(),
             pending_fix: None,
@@ -291,7 +302,7 @@ impl World {
         });
         let sent = self.topics.fix.take(Process::Estimator, now);
         let listening = self.stages.estimator.is_some();
-        self.pending_fix = sent.map(|(fix, _)| fix).filter(|_| listening);
+        self.pending_fix = sent.map(|(fix, _)| *fix).filter(|_| listening);
     }
 
     /// Asks the supervisor.
@@ -309,7 +320,7 @@ impl World {
     /// One tick of simulated time.
     pub fn tick(&mut self, plans: &mut dyn Plans) {
         self.now += TICK;
-        self.fresh = Fresh::default();
+        self.fresh.clear();
         self.follow_schedule();
         self.end_abandoned();
         self.start_processes();

@@ -42,9 +42,9 @@ pub fn run(job: &Job, schedule: Schedule) -> Result<Run, Failure> {
 impl Watcher for Trace {
     fn tick(&mut self, world: &World) -> bool {
         let fresh = &world.fresh;
-        self.odometry.extend(fresh.odometry);
+        self.odometry.extend(fresh.odometry.as_deref());
         self.truth.extend(fresh.truth);
-        self.actuators.extend(fresh.actuator);
+        self.actuators.extend(fresh.actuator.as_deref());
         if let Some(command) = &fresh.command {
             self.command(command);
         }

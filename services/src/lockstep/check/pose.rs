@@ -108,9 +108,10 @@ impl PoseWatch {
     /// None where no truth of that time is known.
     fn compare(&self, odometry: &Odometry) -> Option<Compared> {
         let stamp = odometry.header.stamp;
-        let index = self.truths.partition_point(|truth| truth.header.stamp < stamp);
         let newest = self.truths.back()?;
-        let then = self.truths.get(index).unwrap_or(newest);
+        // The first that is no older; most estimates are of the newest.
+        let no_older = |truth: &&Truth| truth.header.stamp >= stamp;
+        let then = self.truths.iter().rev().take_while(no_older).last().unwrap_or(newest);
         let error = |truth: &Truth| (odometry.x - truth.x, odometry.y - truth.y);
         Some(Compared {
             stamp,

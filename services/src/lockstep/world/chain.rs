@@ -45,33 +45,34 @@ impl World {
             return;
         }
         let came = self.to_host.is_due(self.now);
+        if !came && self.trouble.is_empty() {
+            return;
+        }
         let mut bytes = core::mem::take(&mut self.buffer);
         self.to_host.take(self.now, &mut bytes);
         let hurt = self.hurt(super::super::Way::ToHost, &mut bytes);
-        if let Some(mut interface) = self.stages.interface.take() {
-            if came || hurt {
-                let now = self.now;
-                self.begin(Process::Interface, now);
-                interface.receive(
-                    now,
-                    &bytes,
-                    |reading, errors| {
-                        self.fresh.raw = self
-                            .topics
-                            .raw
-                            .send(now, |raw| {
-                                reading_to_raw(reading, errors, now, raw);
-                                true
-                            })
-                            .or(self.fresh.raw);
-                    },
-                    |_| {},
-                );
-                self.checkpoints(Process::Interface, 2);
-            }
-            self.stages.interface = Some(interface);
+        if self.stages.interface.is_some() && (came || hurt) {
+            self.begin(Process::Interface, self.now);
+            self.read(&bytes);
+            self.checkpoints(Process::Interface, 2);
         }
         self.buffer = bytes;
+    }
+
+    fn read(&mut self, bytes: &[u8]) {
+        let (now, raws, fresh) = (self.now, &mut self.topics.raw, &mut self.fresh);
+        let Some(interface) = &mut self.stages.interface else { return };
+        interface.receive(
+            now,
+            bytes,
+            |reading, errors| {
+                fresh.raw = raws.send(now, |raw| {
+                    reading_to_raw(reading, errors, now, raw);
+                    true
+                });
+            },
+            |_| {},
+        );
     }
 
     pub(super) fn step_ingest(&mut self) {
@@ -111,7 +112,7 @@ impl World {
                 estimator.step(inputs, odometry);
                 true
             });
-            self.fresh.odometry = sent.or(self.fresh.odometry);
+            self.fresh.odometry = sent;
             newest = newest.max(Some(travel.header.origin));
         }
         self.stepped(Process::Estimator, newest);
@@ -133,7 +134,7 @@ impl World {
                 permit: self.topics.permit.newest(Process::Tracker),
             };
             let sent = self.topics.command.send(now, |command| tracker.step(inputs, command));
-            self.fresh.command = sent.or(self.fresh.command);
+            self.fresh.command = sent.or(self.fresh.command.take());
             newest = newest.max(Some(odometry.header.origin));
         }
         self.stepped(Process::Tracker, newest);
@@ -174,7 +175,7 @@ impl World {
         if !self.works(Process::Interface) {
             return;
         }
-        let Some(mut interface) = self.stages.interface.take() else { return };
+        let Some(interface) = &mut self.stages.interface else { return };
         let now = self.now;
         let timeouts = &self.service.safety().timeouts;
         let (freshness, silence) = (nanos(timeouts.freshness), nanos(timeouts.line_silence));
@@ -192,7 +193,6 @@ impl World {
         }
         let waits = interface.waits_for(now, silence);
         self.ready(Process::Interface, waits);
-        self.stages.interface = Some(interface);
     }
 
     pub(super) fn work_on_plan(&mut self, plans: &mut dyn Plans) {

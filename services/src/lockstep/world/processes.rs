@@ -33,21 +33,21 @@ impl Slot {
 }
 
 impl World {
-    fn slot(&self, process: Process) -> Option<&Slot> {
-        self.slots.iter().find(|slot| slot.process == process)
+    fn slot(&self, process: Process) -> &Slot {
+        &self.slots[process as usize]
     }
 
-    fn slot_mut(&mut self, process: Process) -> Option<&mut Slot> {
-        self.slots.iter_mut().find(|slot| slot.process == process)
+    fn slot_mut(&mut self, process: Process) -> &mut Slot {
+        &mut self.slots[process as usize]
     }
 
     fn exists(&self, process: Process) -> bool {
-        self.slot(process).is_some_and(|slot| slot.monitor.is_some())
+        self.slot(process).monitor.is_some()
     }
 
     /// Whether a supervised process has started and lives.
     pub(super) fn is_up(&self, process: Process) -> bool {
-        self.slot(process).is_some_and(|slot| slot.up)
+        self.slot(process).up
     }
 
     /// Whether a process does its work now.
@@ -60,15 +60,13 @@ impl World {
     }
 
     pub(super) fn is_stalled(&self, process: Process) -> bool {
-        let stalled = self.slot(process).and_then(|slot| slot.stalled);
-        stalled.is_some_and(|(_, until)| self.now < until)
+        self.slot(process).stalled.is_some_and(|(_, until)| self.now < until)
     }
 
     /// How long a stall lasted that is over; once.
     pub(super) fn stall_over(&mut self, process: Process) -> Option<Nanos> {
         let now = self.now;
-        let slot = self.slot_mut(process)?;
-        let (since, _) = slot.stalled.take_if(|(_, until)| now >= *until)?;
+        let (since, _) = self.slot_mut(process).stalled.take_if(|(_, until)| now >= *until)?;
         Some(now - since)
     }
 
@@ -76,13 +74,8 @@ impl World {
     pub(super) fn stall(&mut self, process: Process, until: Nanos) {
         let now = self.now;
         let outside = matches!(process, Process::Supervisor | Process::Vehicle);
-        if outside && self.slot(process).is_none() {
-            self.slots.push(Slot::new(process));
-        }
-        let exists = outside || self.exists(process);
-        if let Some(slot) = self.slot_mut(process)
-            && exists
-        {
+        if outside || self.exists(process) {
+            let slot = self.slot_mut(process);
             let (since, before) = slot.stalled.unwrap_or((now, until));
             slot.stalled = Some((since, until.max(before)));
         }
@@ -110,9 +103,7 @@ impl World {
             Process::Planner => (self.planning, self.requested) = (None, None),
             _ => {}
         }
-        if let Some(slot) = self.slot_mut(process) {
-            *slot = Slot::new(process);
-        }
+        *self.slot_mut(process) = Slot::new(process);
         self.deaths.push_back((process, exit));
     }
 
@@ -125,7 +116,7 @@ impl World {
         let limit = nanos(self.service.safety().timeouts.supervisor_silence);
         let silent = |slot: &Slot| slot.up && now.saturating_sub(heard.max(slot.since)) > limit;
         for process in Process::SUPERVISED {
-            if self.slot(process).is_some_and(silent) && !self.is_stalled(process) {
+            if silent(self.slot(process)) && !self.is_stalled(process) {
                 self.end(process, Exit::Code(UNAVAILABLE));
             }
         }
@@ -218,11 +209,9 @@ impl World {
         self.starting.push_back((self.now + START, process, pid));
         self.event(Event::Spawned { process, pid });
         let timeouts = self.service.safety().timeouts.clone();
-        if let Some(slot) = self.slot_mut(process) {
-            let mut made = LoopMonitor::new(process, pid, &timeouts, checkpoints_of(process));
-            made.set_ready(false, "its start");
-            *slot = Slot { pid, monitor: Some(made), ..Slot::new(process) };
-        }
+        let mut made = LoopMonitor::new(process, pid, &timeouts, checkpoints_of(process));
+        made.set_ready(false, "its start");
+        *self.slot_mut(process) = Slot { pid, monitor: Some(made), ..Slot::new(process) };
     }
 
     pub(super) fn start_processes(&mut self) {
@@ -231,7 +220,7 @@ impl World {
             let Some((due, process, pid)) = self.starting.pop_front() else { return };
             if due > now || self.is_stalled(process) {
                 self.starting.push_back((due, process, pid));
-            } else if self.slot(process).is_some_and(|slot| slot.pid == pid) {
+            } else if self.slot(process).pid == pid {
                 self.start(process);
             }
         }
@@ -272,9 +261,8 @@ impl World {
         {
             heartbeats.restart(now);
         }
-        if let Some(slot) = self.slot_mut(process) {
-            (slot.up, slot.since) = (true, now);
-        }
+        let slot = self.slot_mut(process);
+        (slot.up, slot.since) = (true, now);
         if process != Process::Interface {
             self.ready(process, None);
         }
@@ -282,26 +270,27 @@ impl World {
 
     pub(super) fn beat(&mut self) {
         let now = self.now;
+        let mut beat = Heartbeat::default();
         for slot in &mut self.slots {
             if slot.stalled.is_some_and(|(_, until)| now < until) {
                 continue;
             }
             slot.stalled = slot.stalled.filter(|_| slot.process == Process::Vehicle);
             let Some(monitor) = slot.monitor.as_mut().filter(|_| slot.up) else { continue };
+            if !monitor.beat(now, &mut beat) {
+                continue;
+            }
             let found = self.topics.heartbeats.iter_mut().find(|(known, _)| *known == slot.process);
             let Some((_, heartbeats)) = found else { continue };
-            let mut beat = Heartbeat::default();
-            if monitor.beat(now, &mut beat) {
-                heartbeats.send(now, |out| {
-                    *out = beat;
-                    true
-                });
-            }
+            heartbeats.send(now, |out| {
+                *out = beat;
+                true
+            });
         }
     }
 
     fn monitor(&mut self, process: Process) -> Option<&mut LoopMonitor> {
-        self.slot_mut(process)?.monitor.as_mut()
+        self.slot_mut(process).monitor.as_mut()
     }
 
     pub(super) fn ready(&mut self, process: Process, waits_for: Option<&str>) {

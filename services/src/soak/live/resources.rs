@@ -18,7 +18,7 @@ const PAGE: f64 = 4096.0;
 /// What may leak.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Resource {
-    /// Resident memory \[KiB\].
+    /// Resident memory of its own \[KiB\]: pages of shared memory, of fixed size, count where they are first touched.
     Memory,
     /// Open descriptors.
     Descriptors,
@@ -177,8 +177,9 @@ fn blocks(samples: &[Sample]) -> Vec<Vec<(f64, f64)>> {
 
 fn memory(pid: u32) -> Option<f64> {
     let text = fs::read_to_string(format!("/proc/{pid}/statm")).ok()?;
-    let pages: f64 = text.split_whitespace().nth(1)?.parse().ok()?;
-    Some(pages * PAGE / 1024.0)
+    let mut pages = text.split_whitespace().skip(1).map(str::parse::<f64>);
+    let (resident, shared) = (pages.next()?.ok()?, pages.next()?.ok()?);
+    Some((resident - shared) * PAGE / 1024.0)
 }
 
 #[allow(clippy::cast_precision_loss)] // descriptors

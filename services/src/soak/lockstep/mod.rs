@@ -66,7 +66,7 @@ pub fn soak(
     threads: usize,
     stop: &AtomicBool,
 ) -> Result<Totals, Failure> {
-    let begun = kerbside_runtime::now();
+    let (begun, worked) = (kerbside_runtime::now(), kerbside_runtime::processor_time());
     let (scenes, atlas) = (Scenes::load()?, Atlas::default());
     let (next, totals, bar) = (AtomicU64::new(0), Mutex::new(Totals::new(first)), bar(amount));
     let work = || -> Result<(), Failure> {
@@ -98,6 +98,8 @@ pub fn soak(
     let mut totals =
         totals.into_inner().map_err(|_| Failure::internal("a soaking thread ended"))?;
     totals.wall_seconds = kerbside_messages::seconds(kerbside_runtime::now() - begun);
+    totals.processor_seconds =
+        kerbside_messages::seconds(kerbside_runtime::processor_time() - worked);
     totals.threads = threads;
     totals.failed.sort_by_key(|failed| failed.seed);
     for failed in totals.failed.iter_mut().take(SHRUNK) {

@@ -42,6 +42,8 @@ pub struct Totals {
     pub failed: Vec<Failed>,
     /// Wall time \[s\].
     pub wall_seconds: f64,
+    /// Time on a processor, all threads \[s\].
+    pub processor_seconds: f64,
     /// Wall time of searches, all threads \[s\].
     pub search_seconds: f64,
     /// Threads.
@@ -63,6 +65,7 @@ impl Totals {
             clearance: f64::INFINITY,
             failed: Vec::new(),
             wall_seconds: 0.0,
+            processor_seconds: 0.0,
             search_seconds: 0.0,
             threads: 1,
             manoeuvres: 0,
@@ -82,13 +85,13 @@ impl Totals {
         seconds(self.elapsed) / 60.0
     }
 
-    /// Simulated over wall time and threads: searches included, and apart.
+    /// Simulated over wall time and threads, and over time on a processor, which others on a busy machine take less of.
     #[must_use]
     pub fn speed(&self) -> (f64, f64) {
         #[allow(clippy::cast_precision_loss)] // threads
         let spent = self.wall_seconds * self.threads as f64;
         let simulated = seconds(self.elapsed);
-        (simulated / spent.max(1e-9), simulated / (spent - self.search_seconds).max(1e-9))
+        (simulated / spent.max(1e-9), simulated / self.processor_seconds.max(1e-9))
     }
 
     /// Faults that began.

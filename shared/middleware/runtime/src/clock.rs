@@ -14,6 +14,14 @@ pub fn now() -> Nanos {
     time.tv_sec as Nanos * 1_000_000_000 + time.tv_nsec as Nanos
 }
 
+/// Time that all threads of this process have had a processor \[ns\].
+#[must_use]
+#[allow(clippy::cast_sign_loss)] // it starts at zero
+pub fn processor_time() -> Nanos {
+    let time = clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    time.tv_sec as Nanos * 1_000_000_000 + time.tv_nsec as Nanos
+}
+
 /// A timespec of so many nanoseconds.
 #[allow(clippy::cast_possible_wrap)] // both parts are far below 2^63
 pub(crate) fn timespec(nanos: Nanos) -> Timespec {

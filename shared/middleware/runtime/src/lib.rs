@@ -35,7 +35,7 @@ pub use bare::{
     BareSubscriber, bare_listener, bare_notifier,
 };
 pub use census::{Census, Participant};
-pub use clock::{Ticker, now};
+pub use clock::{Ticker, now, processor_time};
 pub use error::RuntimeError;
 pub use instance::{Instance, InstanceError, MAX_NAME};
 pub use lock::{FileLock, LockError};
