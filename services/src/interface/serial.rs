@@ -7,7 +7,7 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
 use rustix::fs::OFlags;
-use rustix::termios::{OptionalActions, isatty, tcgetattr, tcsetattr};
+use rustix::termios::{OptionalActions, QueueSelector, isatty, tcflush, tcgetattr, tcsetattr};
 
 /// An open line: reads and writes without waiting.
 #[derive(Debug)]
@@ -18,7 +18,8 @@ pub struct Line {
 }
 
 impl Line {
-    /// Opens a serial device or pseudo-terminal, raw.
+    /// Opens a serial device or pseudo-terminal, raw. What came before is thrown away: read now, it would carry the stamps
+    /// of now, and counters are cumulative.
     ///
     /// # Errors
     /// Where there is none, or it cannot be set up.
@@ -28,6 +29,7 @@ impl Line {
         let device = OpenOptions::new().read(true).write(true).custom_flags(flags).open(path)?;
         if isatty(&device) {
             make_raw(device.as_fd(), Some(baud))?;
+            tcflush(&device, QueueSelector::IFlush)?;
         }
         Ok(Self { device, cut: 0 })
     }

@@ -17,6 +17,8 @@ use crate::service::Service;
 const REST: f64 = 1e-3;
 /// Rounding, and the motion of one tick of truth \[m\].
 const ROUNDING: f64 = 1e-3;
+/// Begin and end of a stop are each known to one tick of the world \[s\].
+const TICKS: f64 = 2e-3;
 /// Faults count as together where one begins within so long of the other's end \[ns\].
 const TOGETHER: Nanos = 2_000_000_000;
 /// A fault that lasts so long starves what it concerns beyond every time-out \[ns\].
@@ -51,6 +53,14 @@ struct Pending {
     why: String,
 }
 
+/// The newest permit, and what the vehicle did since it was sent.
+#[derive(Clone, Copy, Debug)]
+struct Granted {
+    grant: Grant,
+    distance: f64,
+    fastest: f64,
+}
+
 #[derive(Debug)]
 pub(super) struct StopWatch {
     timeout: f64,
@@ -60,7 +70,7 @@ pub(super) struct StopWatch {
     deceleration: f64,
     cycle: Nanos,
     truth: Truth,
-    granted: Option<(Grant, f64)>,
+    granted: Option<Granted>,
     ended: u64,
     faults: usize,
     pending: Vec<Pending>,
@@ -127,13 +137,8 @@ impl StopWatch {
         let permitted = grant.is_some_and(|grant| grant.withdrawn.is_none());
         for fault in &begun[self.faults..] {
             if permitted && stops(fault) {
-                self.begin(
-                    World::time_of(fault),
-                    self.truth.distance,
-                    grant,
-                    true,
-                    fault.to_string(),
-                );
+                let (since, now) = (World::time_of(fault), self.now());
+                self.begin(since, now, grant, true, fault.to_string());
             }
         }
         self.faults = begun.len();
@@ -142,38 +147,41 @@ impl StopWatch {
     /// The end of a permit: withdrawn, or run out because no further one came.
     fn note_end(&mut self, now: Nanos, grant: Option<Grant>) {
         let Some(newest) = grant else { return };
-        if self.granted.is_none_or(|(known, _)| known.sent != newest.sent) {
-            self.granted = Some((newest, self.truth.distance));
-        }
-        let Some((known, distance)) = self.granted else { return };
+        let (distance, speed) = self.now();
+        let known = match self.granted {
+            Some(known) if known.grant.sent == newest.sent => {
+                Granted { fastest: known.fastest.max(speed), ..known }
+            }
+            _ => Granted { grant: newest, distance, fastest: speed },
+        };
+        self.granted = Some(known);
         if self.ended == newest.arm {
             return;
         }
         if let Some(at) = newest.withdrawn {
             self.ended = newest.arm;
-            self.begin(
-                at,
-                self.truth.distance,
-                grant,
-                false,
-                "the permit was withdrawn".to_owned(),
-            );
-        } else if now > known.sent + 3 * self.cycle && now >= known.expiry {
+            self.begin(at, (distance, speed), grant, false, "the permit was withdrawn".to_owned());
+        } else if now > known.grant.sent + 3 * self.cycle && now >= known.grant.expiry {
             self.ended = newest.arm;
-            self.begin(known.sent, distance, grant, false, "the permit ran out".to_owned());
+            let (since, then) = (known.grant.sent, (known.distance, known.fastest));
+            self.begin(since, then, grant, false, "the permit ran out".to_owned());
         }
+    }
+
+    /// The vehicle's distance and speed \[m, m/s\].
+    fn now(&self) -> (f64, f64) {
+        (self.truth.distance, self.truth.speed.abs())
     }
 
     fn begin(
         &mut self,
         since: Nanos,
-        distance: f64,
+        (distance, fastest): (f64, f64),
         grant: Option<Grant>,
         fault: bool,
         why: String,
     ) {
         let arm = grant.map_or(0, |grant| grant.arm);
-        let fastest = self.truth.speed.abs();
         self.pending.push(Pending { since, distance, fastest, moved: since, arm, fault, why });
     }
 
@@ -210,7 +218,7 @@ impl StopWatch {
             Kind::Stall { process: Process::Vehicle, span } => Some(seconds(span)),
             _ => None,
         });
-        (distance, timeout + self.settle + v / a + stood.sum::<f64>())
+        (distance, timeout + self.settle + v / a + stood.sum::<f64>() + TICKS)
     }
 
     fn is_over(&mut self, one: &Pending, world: &World) -> bool {
