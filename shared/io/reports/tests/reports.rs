@@ -6,6 +6,8 @@ mod samples;
 
 use std::collections::BTreeSet;
 
+use kerbside_simulation::effects::Link;
+
 fn pages() -> Vec<(&'static str, String)> {
     vec![
         ("parked", samples::parked().render().unwrap()),
@@ -303,6 +305,28 @@ fn a_diagnosis_says_where_which_how_far_and_what_next() {
     assert!(page.contains("Unknown cause.") && page.contains("would be a guess"));
     let page = samples::mistaken().render().unwrap();
     assert!(page.contains("A mistake.") && page.contains("yaw rate has the wrong sign"));
+}
+
+/// Which links moved before any fit stands beside the chain, and whether the answer agrees.
+#[test]
+fn the_chain_says_which_links_moved_before_any_fit() {
+    let mut report = samples::diagnosed();
+    let both = "patterns of several links, the likeliest first: speed actuation, ground. The answer is in keeping";
+    let page = report.render().unwrap();
+    assert!(page.contains(both), "{page}");
+    report.diagnosis.moved.truncate(1);
+    let page = report.render().unwrap();
+    for word in
+        ["one link had moved", "pattern of speed actuation.", "was found elsewhere: ground."]
+    {
+        assert!(page.contains(word), "{word:?} is missing");
+    }
+    let mut report = samples::no_gap();
+    let page = report.render().unwrap();
+    assert!(page.contains("no link had moved") && !page.contains("The answer is"), "{page}");
+    report.diagnosis.moved.push(Link::Reference);
+    let page = report.render().unwrap();
+    assert!(page.contains("pattern of reference. The answer is at no link all the same."));
 }
 
 /// The excess of a link is drawn beyond what is allowed, and only of a link that has one.

@@ -218,6 +218,16 @@ fn another_clock_is_found_with_its_offset() {
 }
 
 #[test]
+fn a_lag_that_is_stated_is_no_other_clock() {
+    let mut run = straight();
+    run.reference.iter_mut().for_each(|reading| reading.t += 0.4);
+    let mut noise = car().settings().noise;
+    noise.reference_lag = 0.3;
+    let found = diagnose_runs(&[run, left(), right()], &nominal(), &noise);
+    assert!(found.is_empty(), "{found:?}");
+}
+
+#[test]
 fn samples_that_are_none_are_named() {
     assert_eq!(
         problems(straight(), |run| series(run, 0).value[7] = f64::NAN),
@@ -253,6 +263,19 @@ fn a_counter_that_jumps_is_named() {
         series(run, 0).value[700..].iter_mut().for_each(|value| *value -= 65536.0 / 2000.0 * TAU);
     });
     assert_eq!(found, [Problem::Jump(Wheel::FrontLeft)]);
+}
+
+#[test]
+fn a_row_that_comes_late_is_no_jump() {
+    let found = problems(left(), |run| {
+        for series in run.rotation.iter_mut().flatten() {
+            let rows = series.t.iter().zip(&series.value).step_by(20);
+            let (t, value): (Vec<f64>, Vec<f64>) = rows.map(|(t, value)| (*t, *value)).unzip();
+            (series.t, series.value) = (t, value);
+            series.t[15] = series.t[16] - 1e-4;
+        }
+    });
+    assert_eq!(found, []);
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Where: the chain of links with the gap of each.
 
-use kerbside_diagnosis::LinkGap;
+use kerbside_diagnosis::{Diagnosis, LinkGap};
 use kerbside_geometry::math;
+use kerbside_simulation::effects::Link;
 
 use super::data::{DiagnoseReport, plain, way};
 use crate::format::{self, significant, with_unit};
@@ -25,7 +26,7 @@ impl DiagnoseReport {
         ];
         let table = Table::new("Links, over two seconds", &columns, "No link was measured.")
             .with_rows(diagnosis.links.iter().map(|gap| self.link_row(gap)));
-        let mut blocks = vec![Block::Figure(self.chain())];
+        let mut blocks = vec![Block::Figure(self.chain()), Block::Text(self.moved())];
         blocks.extend(self.map().map(Block::Figure));
         if !diagnosis.regime.is_empty() {
             blocks.push(Block::Text(format!("{}.", capital(&diagnosis.regime))));
@@ -35,6 +36,33 @@ impl DiagnoseReport {
             "Each link is fed with what was measured before it, and asked for what was measured after it. \
              The gap is held against noise alone and against what a car in good order may differ by.",
         )
+    }
+
+    /// What the residuals say of the links before any effect is fitted, and whether the answer agrees.
+    fn moved(&self) -> String {
+        let Diagnosis { moved, links_named, .. } = &self.diagnosis;
+        let names = |links: &[&Link], and: &str| {
+            links.iter().map(|link| plain(link.name())).collect::<Vec<_>>().join(and)
+        };
+        let seen = match &moved.iter().collect::<Vec<_>>()[..] {
+            [] => "no link had moved: what was left had the pattern of none, beyond noise and allowance".to_owned(),
+            [one] => format!("one link had moved: what was left had the pattern of {}", names(&[*one], "")),
+            several => format!(
+                "what was left had the patterns of several links, the likeliest first: {}",
+                names(several, ", ")
+            ),
+        };
+        let elsewhere: Vec<&Link> =
+            links_named.iter().filter(|link| !moved.contains(link)).collect();
+        let after = match (moved.is_empty(), links_named.is_empty(), elsewhere.is_empty()) {
+            (true, true, _) => String::new(),
+            (false, true, _) => " The answer is at no link all the same.".to_owned(),
+            (_, false, true) => " The answer is in keeping with it.".to_owned(),
+            (_, false, false) => {
+                format!(" The answer was found elsewhere: {}.", names(&elsewhere, ", "))
+            }
+        };
+        format!("Before any effect was fitted, {seen}.{after}")
     }
 
     fn chain(&self) -> Figure {

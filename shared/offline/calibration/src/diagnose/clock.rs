@@ -12,8 +12,9 @@ use crate::run::{ReferencePose, Run};
 /// Offsets that are looked for, and their step \[s\].
 const FARTHEST: f64 = 3.0;
 const STEP: f64 = 0.02;
-/// Offsets below this are the sensors' own \[s\].
+/// Offsets below this are the sensors' own \[s\]; so are those within so many deviations of a lag that is stated.
 const LEAST: f64 = 0.05;
+const STATED: f64 = 2.0;
 /// Time over which motion is compared \[s\].
 const WINDOW: f64 = 1.0;
 /// Readings without which nothing is said, and how far apart they may be \[s\].
@@ -62,7 +63,8 @@ pub(crate) fn check(
         best.1 / stretches.len() as f64 + 2.0 * noise.position * noise.position * apart / WINDOW;
     let now = misfit(0.0);
     let better = (now - best.1) / per_reading;
-    if best.0.abs() >= LEAST && better > BETTER && best.1 < LEFT * now {
+    let least = LEAST.max(STATED * noise.reference_lag);
+    if best.0.abs() >= least && better > BETTER && best.1 < LEFT * now {
         let evidence = format!(
             "its motion is the wheels' of {:.2} s {}",
             best.0.abs(),

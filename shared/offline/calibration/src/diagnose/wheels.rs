@@ -61,10 +61,13 @@ pub(crate) fn check_jumps(found: &mut Findings, run: &Run, vehicle: &Vehicle, no
         let Some(series) = &run.rotation[wheel.index()] else { continue };
         let radius = vehicle.radius[wheel.index()];
         let slack = 10.0 * noise.quantum[wheel.index()] + SLACK * vehicle.wheelbase;
-        let jump = |k: &usize| {
-            let step = (series.value[*k] - series.value[*k - 1]).abs() * radius;
-            step > FASTEST * vehicle.limits.speed * (series.t[*k] - series.t[*k - 1]) + slack
+        let leaps = |from: usize, to: usize| {
+            let step = (series.value[to] - series.value[from]).abs() * radius;
+            step > FASTEST * vehicle.limits.speed * (series.t[to] - series.t[from]) + slack
         };
+        // A row whose stamp alone is late leaps by itself, but not together with its neighbours.
+        let last = series.len().saturating_sub(1);
+        let jump = |k: &usize| leaps(*k - 1, *k) && leaps(k.saturating_sub(2), last.min(*k + 1));
         if let Some(k) = (1..series.len()).find(jump) {
             let evidence = format!(
                 "by {:.2} m between {} s and {} s",
