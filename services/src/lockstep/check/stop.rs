@@ -17,8 +17,6 @@ use crate::service::Service;
 const REST: f64 = 1e-3;
 /// Rounding, and the motion of one tick of truth \[m\].
 const ROUNDING: f64 = 1e-3;
-/// Begin and end of a stop are each known to one tick of the world \[s\].
-const TICKS: f64 = 2e-3;
 /// Faults count as together where one begins within so long of the other's end \[ns\].
 const TOGETHER: Nanos = 2_000_000_000;
 /// A fault that lasts so long starves what it concerns beyond every time-out \[ns\].
@@ -218,7 +216,7 @@ impl StopWatch {
             Kind::Stall { process: Process::Vehicle, span } => Some(seconds(span)),
             _ => None,
         });
-        (distance, timeout + self.settle + v / a + stood.sum::<f64>() + TICKS)
+        (distance, timeout + self.settle + v / a + stood.sum::<f64>())
     }
 
     fn is_over(&mut self, one: &Pending, world: &World) -> bool {
