@@ -13,7 +13,7 @@ use std::process::{Command, Stdio};
 
 use common::disturbance::end_if_stalled;
 use common::{Sandbox, undisturbed};
-use common_cli::{Running, Said, finish, run, until_mode};
+use common_cli::{Running, Said, finish, is_documented, run, until_mode};
 use kerbside_messages::pins::{enumerations, layouts, schema_hash};
 use kerbside_messages::topics::{TABLE, type_name_of};
 use kerbside_messages::{Fix, LAYOUT_VERSION, Plan, TrajectoryPoint, seal};
@@ -292,6 +292,7 @@ fn bindings_are_printed_and_told_as_json() {
         assert_eq!((printed.code, printed.stderr.as_str()), (Some(0), ""));
         assert!(printed.stdout.contains(words), "{}", printed.stdout);
         let object = run(&sandbox, &["bindings", language, "--json"]).json();
+        is_documented("bindings c", &object);
         assert_eq!(object["text"].as_str().unwrap(), printed.stdout);
         assert_eq!(
             (&object["language"], &object["layout_version"]),

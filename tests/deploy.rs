@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use common::{PATIENCE, Sandbox, Signal};
-use common_cli::{Running, Said, file, finish, run};
+use common_cli::{Running, Said, file, finish, is_documented, run};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
@@ -411,6 +411,7 @@ fn the_doctor_says_what_is_lacking_and_what_to_do() {
     assert!(said.stdout.lines().all(|line| line.chars().count() <= 80), "{}", said.stdout);
     assert!(said.stdout.contains("/dev/kerbside-none is not there"), "{}", said.stdout);
     let told = run(&sandbox, &["doctor", "--json", "--config", config]).json();
+    is_documented("doctor", &told);
     assert_eq!(told["passed"], false);
     let checks = told["checks"].as_array().unwrap();
     let named = |name: &str| checks.iter().find(|check| check["name"] == name).unwrap();

@@ -13,7 +13,7 @@ use std::process::Stdio;
 
 use common::stack::{poll, send};
 use common::{PATIENCE, Sandbox, Signal};
-use common_cli::{Running, Said, run, until_mode};
+use common_cli::{Running, Said, is_documented, run, until_mode};
 use kerbside::vehicle::pty::Pty;
 use kerbside_messages::topics::RAW;
 use kerbside_messages::{Process, Raw};
@@ -64,6 +64,7 @@ fn tools_show_what_a_stack_does() {
 
 fn topics_are_listed_with_who_takes_part(sandbox: &Sandbox) {
     let listed = good(sandbox, &["topics", "--json"]).json();
+    is_documented("topics", &listed);
     let topics = listed["topics"].as_array().unwrap();
     let of = |name: &str| topics.iter().find(|topic| topic["name"] == name).unwrap();
     let names = |list: &Value| -> Vec<String> {
@@ -107,6 +108,7 @@ fn samples_are_printed(sandbox: &Sandbox) {
 fn rates_are_measured(sandbox: &Sandbox) {
     let measured =
         good(sandbox, &["hz", "raw", "heartbeat/planner", "--window", "1", "--json"]).json();
+    is_documented("hz", &measured);
     let [raw, beat] = &measured["topics"].as_array().unwrap()[..] else { panic!("{measured}") };
     assert_eq!((&raw["name"], &raw["nominal_hz"]), (&"raw".into(), &200.0.into()));
     assert!(
@@ -143,6 +145,7 @@ fn one_table_goes_to_a_pipe(sandbox: &Sandbox) {
     assert!(
         of("supervisor")["pid"].as_u64().unwrap() > 0 && of("vehicle")["pid"].as_u64().unwrap() > 0
     );
+    is_documented("top", &seen);
     let topics = seen["topics"].as_array().unwrap();
     let raw = topics.iter().find(|topic| topic["name"] == "raw").unwrap();
     assert!(

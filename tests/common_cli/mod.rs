@@ -43,6 +43,31 @@ impl Said {
     }
 }
 
+/// Holds the keys of what `verb` printed, those of its parts included, against docs/json.md.
+pub(crate) fn is_documented(verb: &str, object: &Value) {
+    let page = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/json.md")).unwrap();
+    let begin = format!("| `{verb}` |");
+    let row = page.lines().find(|line| line.starts_with(&begin));
+    let row = row.unwrap_or_else(|| panic!("docs/json.md has no {verb}"));
+    let mut keys = Vec::new();
+    collect_keys(object, &mut keys);
+    let common = ["schema", "version", "seed", "passed", "figures"];
+    for key in keys.iter().filter(|key| !common.contains(&key.as_str())) {
+        assert!(row.contains(&format!("`{key}`")), "docs/json.md has no {key} of {verb}");
+    }
+}
+
+fn collect_keys(value: &Value, keys: &mut Vec<String>) {
+    match value {
+        Value::Object(object) => object.iter().for_each(|(key, value)| {
+            keys.push(key.clone());
+            collect_keys(value, keys);
+        }),
+        Value::Array(all) => all.iter().for_each(|value| collect_keys(value, keys)),
+        _ => {}
+    }
+}
+
 /// Without white space and the frame that diagnostics are drawn in: where a line breaks says nothing.
 fn flat(text: &str) -> String {
     text.chars()

@@ -7,12 +7,12 @@ use std::fs;
 use std::path::Path;
 
 use clap::Parser;
-use kerbside_messages::topics::{Delivery, Publisher, TABLE, Topic};
+use kerbside_messages::topics::{Delivery, PERMIT, Publisher, STATE, TABLE, Topic};
 
 use crate::{assert_none, root};
 
 /// Pages for people.
-const PAGES: [&str; 10] = [
+const PAGES: [&str; 11] = [
     "README.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
@@ -20,6 +20,7 @@ const PAGES: [&str; 10] = [
     "docs/bindings.md",
     "deploy/fleet/README.md",
     "docs/gateway.md",
+    "docs/json.md",
     "docs/run-folders.md",
     "deploy/examples/microcontroller/README.md",
     "deploy/examples/python/README.md",
@@ -94,6 +95,15 @@ fn the_table_of_topics_is_the_codes() {
     let end = page.find(TABLE_END).expect("the end of the table");
     let wanted = format!("{}{}{}", &page[..begin], table(), &page[end..]);
     hold("README.md", &page, &wanted);
+}
+
+/// What the supervisor publishes each cycle comes as often as its cycle says.
+#[test]
+fn the_supervisors_topics_come_once_a_cycle() {
+    let cycle = kerbside_safety::SafetySettings::default().cycle.as_secs_f64();
+    for topic in [&PERMIT, &STATE] {
+        assert!((topic.rate * cycle - 1.0).abs() < 1e-9, "{}: {} Hz", topic.name, topic.rate);
+    }
 }
 
 #[test]
@@ -176,6 +186,31 @@ fn verbs_of_the_command_line_are_told_of() {
         })
         .map(|verb| format!("README.md says nothing of kerbside {verb}"))
         .collect();
+    assert_none(&untold);
+}
+
+/// Verbs below `command` that print an object, each with the words that lead to it.
+fn verbs_with_json(command: &clap::Command, words: &str, found: &mut Vec<String>) {
+    for verb in command.get_subcommands().filter(|verb| !verb.is_hide_set()) {
+        let words = format!("{words} {}", verb.get_name());
+        if verb.get_arguments().any(|argument| argument.get_long() == Some("json")) {
+            found.push(words.trim().to_owned());
+        }
+        verbs_with_json(verb, &words, found);
+    }
+}
+
+#[test]
+fn what_verbs_print_as_json_is_told_of() {
+    use clap::CommandFactory;
+    let page = read("docs/json.md");
+    let told: Vec<&str> = page.lines().filter_map(|line| line.strip_prefix("| `")).collect();
+    let mut verbs = Vec::new();
+    verbs_with_json(&kerbside::Cli::command(), "", &mut verbs);
+    assert!(verbs.len() > 20, "{verbs:?}: this test looks at nothing");
+    let is_told = |verb: &str| told.iter().any(|line| line.split('`').next() == Some(verb));
+    let untold = verbs.iter().filter(|verb| !is_told(verb.as_str()));
+    let untold: Vec<_> = untold.map(|verb| format!("docs/json.md has no {verb}")).collect();
     assert_none(&untold);
 }
 

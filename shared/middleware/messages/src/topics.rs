@@ -301,13 +301,13 @@ topics! {
         "The standing trajectory with its certificate.";
     7 COMMAND "command" Command, one(Process::Tracker) => [Actuation, Supervisor, Recorder], wakes Some(Process::Actuation), 200.0 Hz, fresh ms(100), Delivery::Newest, protected true, recorded true,
         "What the tracker asks of the actuators; one per odometry while driving.";
-    8 PERMIT "permit" Permit, one(Process::Supervisor) => [Actuation, Tracker, Recorder], wakes None, 50.0 Hz, fresh ms(150), Delivery::Newest, protected true, recorded true,
+    8 PERMIT "permit" Permit, one(Process::Supervisor) => [Actuation, Tracker, Recorder], wakes None, 100.0 Hz, fresh ms(150), Delivery::Newest, protected true, recorded true,
         "The supervisor's short-lived leave to move.";
     9 INHIBIT "inhibit" Inhibit, Publisher::Any => [Actuation, Supervisor, Recorder], wakes None, 0.0 Hz, fresh None, all(8), protected true, recorded true,
         "A demand from anyone to stop at the gate.";
     10 ACTUATOR "actuator" Actuator, one(Process::Actuation) => [Interface, Supervisor, Recorder], wakes Some(Process::Interface), 200.0 Hz, fresh ms(100), Delivery::Newest, protected true, recorded true,
         "What passed the gate, and why it was altered.";
-    11 STATE "state" State, one(Process::Supervisor) => [Interface, Ingest, Estimator, Planner, Tracker, Actuation, Vehicle, Operator, Recorder], wakes None, 50.0 Hz, fresh ms(500), Delivery::Newest, protected false, recorded true,
+    11 STATE "state" State, one(Process::Supervisor) => [Interface, Ingest, Estimator, Planner, Tracker, Actuation, Vehicle, Operator, Recorder], wakes None, 100.0 Hz, fresh ms(500), Delivery::Newest, protected false, recorded true,
         "Mode, cause, and a row per process.";
     12 HEARTBEAT "heartbeat" Heartbeat, Publisher::Each => [Supervisor, Operator, Recorder], wakes None, 50.0 Hz, fresh ms(200), all(16), protected false, recorded true,
         "Each process's sign of life with its loop timing.";

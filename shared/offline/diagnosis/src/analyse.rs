@@ -60,7 +60,11 @@ pub(crate) fn analyse<'a>(
     let prior = prior(ready);
     progress("first look", 0.05);
     let mut bench = Bench::new(ready, nuisances, &Effects::NEUTRAL, &prior);
-    let all = candidates(ready.vehicle, &bench.extent);
+    let mut all = candidates(ready.vehicle, &bench.extent);
+    if bench.is_cut() && !rivals::comes_back(&bench) {
+        // A place that is passed once is a time: what happens there is an event, and nothing that the floor does.
+        all.retain(|candidate| candidate.definition.id != "floor_patch");
+    }
     // Noise about no effect is no noise: a first search finds about which effects it is to be measured.
     let (first, earlier) = {
         let found = Hypotheses::brief(&Search { bench: &bench, candidates: &all });

@@ -219,7 +219,7 @@ fn unbroken(run: &Run, case: &Case, notices: &mut Vec<String>) -> Vec<(f64, f64)
     spans
 }
 
-/// The same without what no steered axle can do, where wheels alone tell the turn.
+/// The same without turns on the spot, where what was measured drives the model.
 fn without_spots(
     spans: Vec<(f64, f64)>,
     run: &Run,
@@ -231,9 +231,13 @@ fn without_spots(
         return spans;
     }
     notices.push(format!(
-        "{}: {} turns on the spot are left out: no steered axle makes them",
+        "{}: {} left out: the model of a steered axle does not reach so far",
         run.name,
-        spots.len()
+        if spots.len() == 1 {
+            "a turn on the spot is".to_owned()
+        } else {
+            format!("{} turns on the spot are", spots.len())
+        }
     ));
     let mut left = spans;
     for (from, to) in spots {

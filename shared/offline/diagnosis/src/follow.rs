@@ -1,6 +1,6 @@
 //! What was measured of motor and rack.
 
-use kerbside_geometry::{Vehicle, math};
+use kerbside_geometry::{Vehicle, WHEELS, math};
 use kerbside_simulation::{InMotion, Sample};
 
 use crate::bins::to_f64;
@@ -35,6 +35,8 @@ pub(crate) enum Turn {
 
 /// Time over which the first motion is averaged \[s\].
 const FIRST: f64 = 0.2;
+/// Time over which a way becomes a speed \[s\]: over less, stamps that are off by a millisecond make leaps of it.
+const DIFFERENCED: f64 = 0.099;
 /// Share of the speed limit below which a car stands.
 const STANDS: f64 = 0.02;
 
@@ -76,8 +78,8 @@ pub(crate) fn follow(run: &Run, vehicle: &Vehicle) -> Followed {
     let sources = [
         (Turn::Sensor, sensed),
         (Turn::Wheels, turning(run, vehicle)),
-        (Turn::Gyro, by_rates(&rates(&run.gyro), vehicle, &speeds)),
-        (Turn::Reference, by_rates(&turns(&run.reference), vehicle, &speeds)),
+        (Turn::Gyro, by_rates(&rates(&run.gyro), vehicle, &speeds, &used)),
+        (Turn::Reference, by_rates(&turns(&run.reference), vehicle, &speeds, &used)),
     ];
     let (turn, racks) = sources
         .into_iter()
@@ -113,6 +115,9 @@ fn speeds(run: &Run, vehicle: &Vehicle, used: &[usize]) -> Vec<Sample> {
         }
         let turned: f64 = used.iter().map(|wheel| value[*wheel]).sum();
         if let Some((before, from)) = last {
+            if t - before < DIFFERENCED {
+                continue;
+            }
             speeds.push(Sample {
                 t: 0.5 * (t + before),
                 value: radius * (turned - from) / count / (t - before),
@@ -157,12 +162,19 @@ fn turns(reference: &Series<3>) -> Vec<Sample> {
     rates
 }
 
-/// The angles at which the body would turn at these rates, at the speed of the motor.
-fn by_rates(rates: &[Sample], vehicle: &Vehicle, speeds: &[Sample]) -> Vec<Sample> {
+/// The angles at which the body would turn at these rates, at the speed of the wheels in `used`.
+fn by_rates(rates: &[Sample], vehicle: &Vehicle, speeds: &[Sample], used: &[usize]) -> Vec<Sample> {
     let slow = STANDS * vehicle.limits.speed;
+    let places = used.iter().map(|wheel| vehicle.wheel_position(WHEELS[*wheel]));
+    let (x, y) = places.fold((0.0, 0.0), |sum, place| (sum.0 + place.0, sum.1 + place.1));
+    let count = to_f64(used.len().max(1));
+    let (ahead, aside) = (x / count, y / count);
     // A car that stands keeps its wheels where they were.
     let angle = |rate: &Sample| {
-        let speed = between(speeds, rate.t);
+        // A wheel off the middle of the rear axle rolls another way in a bend than that.
+        let rolled = between(speeds, rate.t);
+        let along = (rolled * rolled - (ahead * rate.value).powi(2)).max(0.0).sqrt();
+        let speed = along.copysign(rolled) + aside * rate.value;
         (speed.abs() > slow).then(|| Sample {
             t: rate.t,
             value: math::atan(vehicle.wheelbase * rate.value / speed).clamp(-LARGEST, LARGEST),
@@ -191,10 +203,13 @@ const ON_THE_SPOT: f64 = 1.3;
 /// Times the way of a car that stands by which its wheels go apart where it turns on the spot.
 const SPOT: f64 = 20.0;
 
-/// When a vehicle turned on the spot \[s\], as two wheels of an axle tell it: no steered axle can.
+/// When a vehicle turned on the spot \[s\], as two wheels of an axle tell it, or a steered wheel that stands nearly across:
+/// there a little more of an angle is any curvature, and no error is small.
 pub(crate) fn spots(run: &Run, vehicle: &Vehicle) -> Vec<(f64, f64)> {
     let followed = follow(run, vehicle);
-    if followed.turn != Turn::Wheels {
+    // A sensor that shows what its vehicle cannot do is a mistake.
+    let steers_across = followed.turn == Turn::Sensor && vehicle.limits.steering > ON_THE_SPOT;
+    if followed.turn != Turn::Wheels && !steers_across {
         return Vec::new();
     }
     let mut spots: Vec<(f64, f64)> = Vec::new();

@@ -28,6 +28,7 @@ pub(crate) fn shapes(bench: &Bench<'_>) -> Vec<Shapes> {
         .into_iter()
         .filter(shown)
         .flat_map(|entry| Axis::ALL.into_iter().map(move |axis| (entry, axis)))
+        .filter(|(_, axis)| *axis != Axis::Direction || goes_both_ways(bench))
         .filter(|(_, axis)| *axis != Axis::Place || !bench.is_cut() || comes_back(bench))
         .filter(|(entry, axis)| {
             *axis != Axis::Turn || matches!(entry, Entry::Wheel(_) | Entry::Curvature | Entry::Slip)
@@ -36,8 +37,16 @@ pub(crate) fn shapes(bench: &Bench<'_>) -> Vec<Shapes> {
     pairs.par_iter().map(|(entry, axis)| of(bench, *entry, *axis)).collect()
 }
 
+/// Whether the car went forwards and in reverse, each farther than it is long: else what depends on the direction is the
+/// same throughout, as listed effects are.
+fn goes_both_ways(bench: &Bench<'_>) -> bool {
+    let ways = || bench.paths.iter().flat_map(|path| path.steps.iter().map(|step| step.distance));
+    let way = |sign: f64| ways().map(|way| (sign * way).max(0.0)).sum::<f64>();
+    way(1.0).min(way(-1.0)) > bench.extent.wheelbase
+}
+
 /// Whether the paths of different runs meet in most of the map: a place that is passed once is a time.
-fn comes_back(bench: &Bench<'_>) -> bool {
+pub(crate) fn comes_back(bench: &Bench<'_>) -> bool {
     let [x0, y0, x1, y1] = bench.extent.place;
     let pitch = ((x1 - x0).max(y1 - y0) / PARTS).max(1e-9);
     let mut seen: Vec<((i64, i64), usize)> = Vec::new();

@@ -6,7 +6,7 @@
 #[allow(dead_code)] // What the other tests use.
 mod support;
 
-use kerbside_diagnosis::{DiagnosisError, Settings, Verdict, Wheels, diagnose};
+use kerbside_diagnosis::{Case, DiagnosisError, Settings, Verdict, Wheels, diagnose};
 use kerbside_simulation::effects::Link;
 use kerbside_simulation::{Effects, Parameter};
 use support::{ALL, Sensors, answer, case, with};
@@ -174,4 +174,29 @@ fn nothing_to_diagnose_is_said() {
 fn the_same_case_gives_the_same_answer() {
     let case = case(&with("understeer", "gradient", 0.8), ALL, 11);
     assert_eq!(format!("{:?}", answer(&case)), format!("{:?}", answer(&case)));
+}
+
+/// One wheel's counts and a gyro: nothing but the reference tells how far the car went.
+fn one_wheel_and_gyro(effects: &Effects, seed: u64) -> Case {
+    let mut case = case(effects, Sensors { steering: false, gyro: true, yaw: true }, seed);
+    for run in &mut case.runs {
+        let Wheels::Rotation(series) = &mut run.wheels else { panic!("counts") };
+        series.value.iter_mut().for_each(|row| *row = [f64::NAN, f64::NAN, row[2], f64::NAN]);
+    }
+    case
+}
+
+#[test]
+fn with_one_wheel_and_a_gyro_a_scale_of_the_reference_is_no_unknown_cause() {
+    for (scale, seed, commanded) in [(0.96, 12, true), (0.97, 13, false)] {
+        let mut case = one_wheel_and_gyro(&with("reference_scale", "scale", scale), seed);
+        if !commanded {
+            case.runs.iter_mut().for_each(|run| run.commands.clear());
+        }
+        let found = answer(&case);
+        let listed = matches!(found.verdict, Verdict::Effects | Verdict::Ambiguous);
+        assert!(listed, "{commanded}: {}", found.sentence);
+        let ids: Vec<&str> = found.alternatives.iter().flat_map(|a| a.ids.clone()).collect();
+        assert!(ids.contains(&"reference_scale"), "{commanded}: {ids:?}");
+    }
 }

@@ -122,3 +122,36 @@ fn the_links_that_moved_are_named_before_any_fit() {
     let calm = answer(&case(&Effects::NEUTRAL, ALL, 29));
     assert!(calm.moved.is_empty(), "{:?}", calm.moved);
 }
+
+#[test]
+fn a_wheel_steered_across_is_left_out_and_the_rest_tells_the_radius() {
+    let mut log = case(&with("radius_scale", "scale", 0.95), ALL, 31);
+    log.vehicle.limits.steering = 1.55;
+    for run in &mut log.runs {
+        run.commands.clear();
+        // A corner in the midst of the run, that the reference did not take.
+        let corner = run.steering.t.iter().zip(&mut run.steering.value);
+        corner.filter(|(t, _)| (6.0..7.0).contains(*t)).for_each(|(_, angle)| angle[0] = 1.54);
+    }
+    let found = answer(&log);
+    names(&found, "radius_scale", 0.95, 0.004);
+    assert!(found.notices.iter().any(|notice| notice.contains("a turn on the spot is left out")));
+}
+
+#[test]
+fn stamps_that_jitter_make_no_leaps_of_the_speed() {
+    let mut log = case(&with("radius_scale", "scale", 0.95), ALL, 32);
+    for run in &mut log.runs {
+        run.commands.clear();
+        let Wheels::Rotation(series) = &mut run.wheels else { panic!("counts") };
+        // Every tenth row comes late, together with the next.
+        for k in (5..series.t.len() - 1).step_by(10) {
+            series.t[k] = series.t[k + 1] - 1e-4;
+        }
+    }
+    let found = answer(&log);
+    names(&found, "radius_scale", 0.95, 0.004);
+    for link in found.links.iter().filter(|link| link.measured && link.unit == "m") {
+        assert!(link.floor < 0.03 && link.allowance < 0.03, "{link:?}");
+    }
+}
