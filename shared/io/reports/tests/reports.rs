@@ -307,6 +307,18 @@ fn a_diagnosis_says_where_which_how_far_and_what_next() {
     assert!(page.contains("A mistake.") && page.contains("yaw rate has the wrong sign"));
 }
 
+/// What a second effect may hold unseen stands beside the probability, and nothing does where there is none.
+#[test]
+fn what_may_act_unseen_stands_beside_the_probability() {
+    let page = samples::diagnosed().render().unwrap();
+    assert!(page.contains("0.04 that another acts unseen"));
+    assert!(page.contains("too small for these runs, acts beside it has a probability of 0.04"));
+    for page in [samples::ambiguous(), samples::no_gap(), samples::unknown()] {
+        let page = page.render().unwrap();
+        assert!(page.contains("of this answer") && !page.contains("acts beside it"));
+    }
+}
+
 /// Which links moved before any fit stands beside the chain, and whether the answer agrees.
 #[test]
 fn the_chain_says_which_links_moved_before_any_fit() {

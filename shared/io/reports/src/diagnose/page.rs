@@ -78,7 +78,7 @@ impl DiagnoseReport {
         vec![
             KeyFigure::plain("Where", capital(&place), regime),
             KeyFigure::plain("Cause", capital(&self.cause()), &self.cause_note()),
-            KeyFigure::plain("Probability", self.probability(), "of this answer"),
+            KeyFigure::plain("Probability", self.probability(), &self.probability_note()),
             KeyFigure::plain(
                 "Gap removed",
                 format::optional(removed.map(|r| r.value), percent),
@@ -158,6 +158,14 @@ impl DiagnoseReport {
             }
         };
         found.map_or_else(|| UNKNOWN.to_owned(), probability)
+    }
+
+    /// What the rest of the probability is, where a second effect may act unseen.
+    fn probability_note(&self) -> String {
+        match self.diagnosis.unseen {
+            unseen if unseen > 0.0 => format!("{} that another acts unseen", probability(unseen)),
+            _ => "of this answer".to_owned(),
+        }
     }
 
     fn mistake_section(&self) -> Option<Section> {

@@ -77,10 +77,12 @@ impl DiagnoseReport {
         };
         let next = diagnosis.ranking.iter().find(|rival| !chosen(&rival.name));
         let rival = next.map(|rival| (plain(&rival.name), probability(rival.probability)));
-        let unseen = format!(
-            "That another effect, too small for these runs, acts beside it has a probability of {}.",
-            probability(diagnosis.unseen)
-        );
+        let unseen = (diagnosis.unseen > 0.0).then(|| {
+            format!(
+                "That another effect, too small for these runs, acts beside it has a probability of {}.",
+                probability(diagnosis.unseen)
+            )
+        });
         Some(match (diagnosis.verdict, rival) {
             (Verdict::None, _) => "An effect larger than the sizes below would have been seen.".to_owned(),
             (Verdict::Unknown, _) => {
@@ -93,11 +95,12 @@ impl DiagnoseReport {
                 "More of the same runs will not decide; the manoeuvre below will.".to_owned()
             }
             (Verdict::Effects, Some((name, probability))) => {
-                format!(
-                    "The verdict's nearest rival is {name}, at a probability of {probability}. {unseen}"
-                )
+                let nearest = format!(
+                    "The verdict's nearest rival is {name}, at a probability of {probability}."
+                );
+                [Some(nearest), unseen].into_iter().flatten().collect::<Vec<_>>().join(" ")
             }
-            (Verdict::Effects, None) => unseen,
+            (Verdict::Effects, None) => return unseen,
         })
     }
 }
