@@ -46,9 +46,22 @@ struct Pending {
     moved: Nanos,
     /// The arm it ends; a newer one ends it.
     arm: u64,
-    /// A fault began it: it is over when its time is, not when the vehicle stands for the first time.
-    fault: bool,
+    cause: Cause,
     why: String,
+}
+
+/// What a stop is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cause {
+    /// The permit ended: it is over when the vehicle stands.
+    Permit,
+    /// A fault while the vehicle drove: it is over when its time is, not when the vehicle stands for the first time.
+    Driving,
+    /// A fault while the vehicle, armed, had not moved yet: nothing forbids a first motion after its end.
+    Standing {
+        /// End of the fault.
+        until: Nanos,
+    },
 }
 
 /// The newest permit, and what the vehicle did since it was sent.
@@ -70,6 +83,8 @@ pub(super) struct StopWatch {
     truth: Truth,
     granted: Option<Granted>,
     ended: u64,
+    /// The newest arm that the vehicle moved in.
+    driven: u64,
     faults: usize,
     pending: Vec<Pending>,
     done: Vec<Stop>,
@@ -91,6 +106,7 @@ impl StopWatch {
             truth: Truth::default(),
             granted: None,
             ended: 0,
+            driven: 0,
             faults: 0,
             pending: Vec::new(),
             done: Vec::new(),
@@ -114,6 +130,9 @@ impl StopWatch {
             self.truth = *truth;
         }
         self.note_faults(world, grant);
+        if let Some(grant) = grant.filter(|_| self.truth.speed.abs() >= REST) {
+            self.driven = grant.arm;
+        }
         self.note_end(world.now(), grant);
         if self.pending.is_empty() {
             return Ok(());
@@ -136,7 +155,12 @@ impl StopWatch {
         for fault in &begun[self.faults..] {
             if permitted && stops(fault) {
                 let (since, now) = (World::time_of(fault), self.now());
-                self.begin(since, now, grant, true, fault.to_string());
+                let cause = if grant.is_some_and(|grant| grant.arm == self.driven) {
+                    Cause::Driving
+                } else {
+                    Cause::Standing { until: since + fault.kind.span() }
+                };
+                self.begin(since, now, grant, cause, fault.to_string());
             }
         }
         self.faults = begun.len();
@@ -158,11 +182,17 @@ impl StopWatch {
         }
         if let Some(at) = newest.withdrawn {
             self.ended = newest.arm;
-            self.begin(at, (distance, speed), grant, false, "the permit was withdrawn".to_owned());
+            self.begin(
+                at,
+                (distance, speed),
+                grant,
+                Cause::Permit,
+                "the permit was withdrawn".to_owned(),
+            );
         } else if now > known.grant.sent + 3 * self.cycle && now >= known.grant.expiry {
             self.ended = newest.arm;
             let (since, then) = (known.grant.sent, (known.distance, known.fastest));
-            self.begin(since, then, grant, false, "the permit ran out".to_owned());
+            self.begin(since, then, grant, Cause::Permit, "the permit ran out".to_owned());
         }
     }
 
@@ -176,11 +206,11 @@ impl StopWatch {
         since: Nanos,
         (distance, fastest): (f64, f64),
         grant: Option<Grant>,
-        fault: bool,
+        cause: Cause,
         why: String,
     ) {
         let arm = grant.map_or(0, |grant| grant.arm);
-        self.pending.push(Pending { since, distance, fastest, moved: since, arm, fault, why });
+        self.pending.push(Pending { since, distance, fastest, moved: since, arm, cause, why });
     }
 
     fn follow(&self, one: &mut Pending, world: &World) -> Result<(), (Invariant, String)> {
@@ -223,7 +253,12 @@ impl StopWatch {
         let stands = self.truth.speed.abs() < REST;
         let (bound, time) = self.bounds(one, world);
         let passed = seconds(world.now() - one.since) > time;
-        let over = stands && (!one.fault || passed);
+        let over = stands
+            && match one.cause {
+                Cause::Permit => true,
+                Cause::Driving => passed,
+                Cause::Standing { until } => passed || world.now() >= until,
+            };
         if over && one.fastest > 0.01 {
             self.done.push(Stop {
                 speed: one.fastest,
