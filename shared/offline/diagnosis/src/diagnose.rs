@@ -82,7 +82,7 @@ pub fn diagnose(
     let found = analyse(&ready, &differ, progress).ok_or_else(|| {
         DiagnosisError::Nothing("no sensor shows anything that commands could explain".to_owned())
     })?;
-    progress("how far the gap shrinks", 0.88);
+    progress("which of them", 0.86);
     let mut decision = decide(&found);
     let search = Search { bench: &found.bench, candidates: &found.candidates };
     trust::distrust(&found, &search, &mut decision);
@@ -126,9 +126,11 @@ fn told(
         .iter()
         .map(|run| analysis.bench.raw_of(*run, &Effects::NEUTRAL))
         .collect();
+    progress("the gap, link by link", 0.87);
     let chain = links::chain(&analysis.bench, &analysis.noise, &neutral);
     let links_named = links_named(verdict, mistake.as_ref(), decision, &effects);
     let rivals: Vec<usize> = decision.sets.iter().take(RIVALS).map(|weighed| weighed.fit).collect();
+    progress("how far the gap shrinks", 0.88);
     let gap = shrink::shrinkage(found, &search, &rivals, by_hand.as_ref(), named);
     progress("what to drive next", 0.94);
     let gauges = gauge(&search);
