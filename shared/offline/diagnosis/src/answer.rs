@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::bench::Bench;
-use crate::bins::to_f64;
+use crate::bins::{Channels, REFERENCE, to_f64};
 use crate::candidate::Coordinate;
 use crate::case::{Case, Run, Series, Wheels};
 use crate::decide::{SET, temper};
@@ -35,11 +35,14 @@ pub(crate) fn effects(found: &Found<'_>, search: &Search<'_>) -> Vec<FoundEffect
     let mut row = 0;
     for (member, (candidate, at)) in fit.set.iter().zip(&fit.at).enumerate() {
         let own = &search.candidates[*candidate];
+        // A place is known as well as the path that the model drives.
+        let astray = if own.is_patch() { astray(search, fit) } else { 0.0 };
         let spread: Vec<f64> = (0..at.len())
             .map(|c| {
                 let model = wider * covariance[(row + c, row + c)].sqrt();
                 let error = scatter.as_ref().map_or(model, |scatter| model.max(scatter[row + c]));
-                HALF * error * own.coordinates[c].deviation
+                let error = error * own.coordinates[c].deviation;
+                HALF * if own.is_patch() && c < 3 { math::hypot(error, astray) } else { error }
             })
             .collect();
         row += at.len();
@@ -75,6 +78,16 @@ pub(crate) fn effects(found: &Found<'_>, search: &Search<'_>) -> Vec<FoundEffect
         });
     }
     effects
+}
+
+/// How far the reference sees the car from where the model with a fit's effects has it \[m\], root mean square.
+fn astray(search: &Search<'_>, fit: &Fit) -> f64 {
+    let rows =
+        search.bench.all().into_iter().flat_map(|run| search.bench.raw_of(run, &fit.effects));
+    let square =
+        |row: Channels| row[REFERENCE] * row[REFERENCE] + row[REFERENCE + 1] * row[REFERENCE + 1];
+    let squares: Vec<f64> = rows.map(square).filter(|square| square.is_finite()).collect();
+    (squares.iter().sum::<f64>() / to_f64(squares.len().max(1))).sqrt()
 }
 
 /// Points of a staircase that are tried.

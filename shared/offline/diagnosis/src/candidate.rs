@@ -233,8 +233,7 @@ impl Candidate {
 
     /// Whether every coordinate may leave its neutral value in both directions.
     pub(crate) fn is_two_sided(&self) -> bool {
-        self.coordinates.iter().all(|c| c.low < c.neutral && c.neutral < c.high)
-            && self.definition.id != "floor_patch"
+        self.coordinates.iter().all(|c| c.low < c.neutral && c.neutral < c.high) && !self.is_patch()
     }
 
     /// Whether it is a limit that lowers another.
@@ -256,24 +255,16 @@ impl Candidate {
     pub(crate) fn probe(&self, coordinate: usize, extent: &Extent) -> f64 {
         let c = &self.coordinates[coordinate];
         // A disc's edge meets the bins one by one: a small step would see none of them.
-        if self.definition.id == "floor_patch" && coordinate < 3 {
-            0.1 * extent.wheelbase
-        } else {
-            0.02 * c.deviation
-        }
+        if self.is_patch() && coordinate < 3 { 0.1 * extent.wheelbase } else { 0.02 * c.deviation }
     }
 
-    /// Where to begin: the candidate's own points, or discs along the paths.
-    pub(crate) fn begins(&self, extent: &Extent, places: &[(f64, f64)]) -> Vec<Vec<f64>> {
-        if self.definition.id != "floor_patch" {
-            return self.starts.clone();
-        }
-        let mut begins = Vec::new();
-        for radius in [0.5, 1.2, 2.5] {
-            for (x, y) in places {
-                begins.push(vec![*x, *y, radius * extent.wheelbase, 0.05]);
-            }
-        }
-        begins
+    /// Whether it is a place on the floor, which is sought on the map.
+    pub(crate) fn is_patch(&self) -> bool {
+        self.definition.id == "floor_patch"
+    }
+
+    /// Where to begin; nothing for one that is sought on the map.
+    pub(crate) fn begins(&self) -> &[Vec<f64>] {
+        &self.starts
     }
 }

@@ -22,6 +22,7 @@ mod moved;
 mod noise;
 mod nuisance;
 mod outliers;
+mod patch;
 mod path;
 mod pictures;
 mod prepare;

@@ -38,6 +38,16 @@ impl Projection {
         &self.runs
     }
 
+    /// Inner products of a run's columns with the columns that count.
+    pub(crate) fn along(&self, designs: &[Design], run: usize, own: &DMatrix<f64>) -> DMatrix<f64> {
+        designs[run].tr_mul(own).select_rows(&self.keep)
+    }
+
+    /// What integrating the columns out takes from inner products of vectors whose products with them are `one` and `other`.
+    pub(crate) fn taken(&self, one: &DMatrix<f64>, other: &DMatrix<f64>) -> DMatrix<f64> {
+        one.tr_mul(&self.root.solve(other))
+    }
+
     /// Inner products of `vectors` (`[vector][run]`) with the columns integrated out: `V' (I - X A^-1 X') V`.
     pub(crate) fn products(&self, designs: &[Design], vectors: &[&[DVector<f64>]]) -> DMatrix<f64> {
         let n = vectors.len();
@@ -48,9 +58,9 @@ impl Projection {
                 vectors.iter().map(|vector| vector[*run].clone()).collect();
             let own = DMatrix::from_columns(&own);
             plain += gram(&own);
-            along += designs[*run].tr_mul(&own).select_rows(&self.keep);
+            along += self.along(designs, *run, &own);
         }
-        plain - along.tr_mul(&self.root.solve(&along))
+        plain - self.taken(&along, &along)
     }
 }
 

@@ -35,17 +35,16 @@ pub(crate) struct Foretold {
     pub log_evidence: f64,
 }
 
-/// Where a candidate's search may begin: secants from its neutral point to each begin, or slopes at the neutral point.
+/// Where a candidate's search may begin: secants from its neutral point to each of `begins`, or slopes at the neutral point.
 pub(crate) fn openings(
     search: &Search<'_>,
     nothing: &Whole,
     candidate: usize,
-    places: &[(f64, f64)],
+    begins: Vec<Vec<f64>>,
 ) -> Vec<Piece> {
     let own = &search.candidates[candidate];
     let runs = search.bench.all();
     let Some(projection) = search.projection(&[candidate], &runs) else { return Vec::new() };
-    let begins = own.begins(&search.bench.extent, places);
     if own.is_two_sided() {
         let slopes = |at: &Vec<f64>| {
             let slope = |c: usize| {

@@ -1,16 +1,17 @@
 //! Which sets of effects come into question: every single one, and pairs that grow from the best of them.
 
-use kerbside_geometry::math;
 use kerbside_simulation::Effects;
 use rayon::prelude::*;
 
 use crate::bench::Whole;
 use crate::fit::{Fit, Search};
 use crate::linear::Projection;
+use crate::patch::Floor;
 use crate::screen::{self, Foretold, Piece, Screen};
 
-/// Discs tried along the paths, for each radius.
-const PLACES: usize = 48;
+/// Discs of the map that come into question, alone and beside each of the likeliest singles.
+const DISCS: usize = 16;
+const DISCS_BESIDE: usize = 4;
 /// Begins of a floor's patch that are fitted, and of any other candidate.
 const PATCHES: usize = 6;
 const BEGINS: usize = 2;
@@ -94,7 +95,46 @@ fn finished(search: &Search<'_>, fits: &[Fit]) -> Option<Fit> {
 }
 
 fn is_patch(search: &Search<'_>, candidate: usize) -> bool {
-    search.candidates[candidate].definition.id == "floor_patch"
+    search.candidates[candidate].is_patch()
+}
+
+/// What slip in each place of the floor does, where that comes into question.
+fn floor<'a>(search: &'a Search<'a>) -> Option<(usize, Floor<'a>)> {
+    let patch = (0..search.candidates.len()).find(|candidate| is_patch(search, *candidate))?;
+    Some((patch, Floor::new(search, patch)?))
+}
+
+/// Begins of every candidate on the residuals without any effect.
+fn openings(search: &Search<'_>, nothing: &Whole, floor: Option<&Floor<'_>>) -> Vec<Piece> {
+    let open = |candidate: usize| {
+        let own = &search.candidates[candidate];
+        let begins = if own.is_patch() {
+            let map = floor.and_then(|floor| floor.map(nothing, &[]));
+            map.map(|map| map.discs(DISCS)).unwrap_or_default()
+        } else {
+            own.begins().to_vec()
+        };
+        screen::openings(search, nothing, candidate, begins)
+    };
+    (0..search.candidates.len()).into_par_iter().flat_map(open).collect()
+}
+
+/// Discs that come into question beside the likeliest singles.
+fn discs_beside(
+    search: &Search<'_>,
+    nothing: &Whole,
+    singles: &[Fit],
+    (patch, floor): &(usize, Floor<'_>),
+) -> Vec<Piece> {
+    let beside = |fit: &Fit| {
+        let projection = search.projection(&fit.set, &search.bench.all())?;
+        let whole = search.bench.whole(&fit.effects);
+        let map = floor.map(&whole, &search.slopes(fit, &whole, &projection))?;
+        Some(map.discs(DISCS_BESIDE))
+    };
+    let others = singles.iter().filter(|fit| fit.set != [*patch]).take(KEEP);
+    let begins = others.filter_map(beside).flatten().collect();
+    screen::openings(search, nothing, *patch, begins)
 }
 
 /// The `count` pairs of which most is foretold, fitted in `rounds`, and for each of the likeliest singles its likeliest
@@ -182,20 +222,6 @@ const COMPASS: [[f64; 3]; 18] = [
     [0.0, -0.7, -0.7],
 ];
 
-/// Places along the paths, spread evenly.
-fn places(search: &Search<'_>) -> Vec<(f64, f64)> {
-    let pitch = 0.8 * search.bench.extent.wheelbase;
-    let mut places: Vec<(f64, f64)> = Vec::new();
-    for pose in search.bench.paths.iter().flat_map(|path| &path.pose) {
-        let far = |place: &(f64, f64)| math::hypot(place.0 - pose.x, place.1 - pose.y) > pitch;
-        if places.iter().all(far) {
-            places.push((pose.x, pose.y));
-        }
-    }
-    let stride = places.len().div_ceil(PLACES).max(1);
-    places.into_iter().step_by(stride).collect()
-}
-
 /// No effect at all.
 pub(crate) fn nothing(search: &Search<'_>) -> Option<Fit> {
     let projection = search.projection(&[], &search.bench.all())?;
@@ -222,13 +248,14 @@ impl Hypotheses {
     }
 
     fn new(search: &Search<'_>, earlier: &[Fit], full: bool) -> Self {
-        let places = places(search);
         let nothing = search.bench.whole(&Effects::NEUTRAL);
-        let all: Vec<usize> = (0..search.candidates.len()).collect();
-        let open = |candidate: &usize| screen::openings(search, &nothing, *candidate, &places);
-        let openings: Vec<Piece> = all.par_iter().flat_map(open).collect();
+        let floor = floor(search);
+        let mut openings = openings(search, &nothing, floor.as_ref().map(|known| &known.1));
         let mut singles = self::singles(search, &nothing, &openings, earlier, full);
         rank(&mut singles);
+        if let Some(floor) = floor.filter(|_| full) {
+            openings.extend(discs_beside(search, &nothing, &singles, &floor));
+        }
         let effort = if full { (PAIRS, FULL) } else { (FIRST_PAIRS, BRIEF) };
         let mut pairs = self::pairs(search, &nothing, openings, &singles, effort);
         rank(&mut pairs);

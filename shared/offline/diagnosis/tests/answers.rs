@@ -52,6 +52,29 @@ fn a_reference_delay_is_found() {
     finds("reference_delay", "delay", 0.1, Link::Reference, 0.005);
 }
 
+/// Wherever it lies and however large it is: its edges make many small valleys, and the right one is found.
+#[test]
+fn a_patch_of_the_floor_is_found_with_its_edges() {
+    let names = ["x", "y", "radius", "ratio"];
+    for (seed, disc) in [[0.6, 0.3, 0.6, 0.1], [1.2, -0.2, 0.9, 0.07], [0.0, 0.5, 0.4, 0.15]]
+        .into_iter()
+        .enumerate()
+    {
+        let put = |effects: Effects, (name, value): (&str, f64)| {
+            effects.with(Parameter::find("floor_patch", name).expect("listed"), value)
+        };
+        let effects = names.into_iter().zip(disc).fold(Effects::NEUTRAL, put);
+        let found = answer(&case(&effects, ALL, 40 + seed as u64));
+        assert_eq!(found.verdict, Verdict::Effects, "{disc:?}: {}", found.sentence);
+        assert_eq!(found.effects.len(), 1, "{disc:?}: {}", found.sentence);
+        for (parameter, truth) in found.effects[0].parameters.iter().zip(disc) {
+            let limit = if parameter.name == "ratio" { 0.01 } else { 0.05 };
+            let off = (parameter.value.value - truth).abs();
+            assert!(off < limit, "{disc:?}, {}: {}", parameter.name, found.sentence);
+        }
+    }
+}
+
 #[test]
 fn two_effects_are_found_together() {
     let effects = with("steering_offset", "offset", 0.025)

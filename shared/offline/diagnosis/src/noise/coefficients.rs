@@ -26,6 +26,8 @@ pub(crate) const RUN: usize = 20;
 /// Inputs that move the integrated states: the coloured ones from SPEED to WHEELS + 3.
 pub(crate) const INPUTS: usize = 9;
 
+/// The input of [`Coefficients::response`] that is slip of the driven wheels.
+pub(crate) const OF_SLIP: usize = 1;
 /// The input of [`Coefficients::response`] that is the first wheel's.
 pub(crate) const OF_WHEEL: usize = 5;
 

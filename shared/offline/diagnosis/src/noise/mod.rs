@@ -8,7 +8,7 @@ mod filter;
 mod fit;
 mod level;
 
-pub(crate) use coefficients::{Coefficients, OF_WHEEL};
+pub(crate) use coefficients::{Coefficients, OF_SLIP, OF_WHEEL};
 pub(crate) use draw::{draw, normal};
 pub(crate) use filter::Whitener;
 pub(crate) use fit::{Evidence, fit};
