@@ -75,9 +75,9 @@ impl VehicleStage {
         self.zero = self.simulator.reading().counts;
     }
 
-    /// The clock that readings are stamped by jumps by `by` \[ns\], not below zero.
+    /// The clock that readings are stamped by jumps by `by` \[ns\], not below zero, and goes on from there.
     pub fn step_clock(&mut self, by: i64) {
-        self.clock += by;
+        self.clock = (self.clock + by).max(-self.time.cast_signed());
     }
 
     /// Another silence time-out \[ms\].
