@@ -325,7 +325,9 @@ impl Session {
     ) -> SessionError {
         match error {
             PublishSubscribeOpenError::ExceedsMaxNumberOfNodes => no_room(M::TOPIC),
-            PublishSubscribeOpenError::DoesNotExist => self.missing::<M>(),
+            // Half made: whoever makes it waits for a busy machine.
+            PublishSubscribeOpenError::DoesNotExist
+            | PublishSubscribeOpenError::HangsInCreation => self.missing::<M>(),
             PublishSubscribeOpenError::IncompatibleTypes => {
                 self.incompatible::<M>(process, MessagingPattern::PublishSubscribe)
             }
@@ -364,7 +366,9 @@ impl Session {
 
     fn request_response_error<M: Message>(&self, error: RequestResponseOpenError) -> SessionError {
         match error {
-            RequestResponseOpenError::DoesNotExist => self.missing::<M>(),
+            RequestResponseOpenError::DoesNotExist | RequestResponseOpenError::HangsInCreation => {
+                self.missing::<M>()
+            }
             RequestResponseOpenError::ExceedsMaxNumberOfNodes => no_room(M::TOPIC),
             RequestResponseOpenError::IncompatibleRequestOrResponseType => {
                 self.incompatible::<M>(None, MessagingPattern::RequestResponse)
@@ -377,7 +381,7 @@ impl Session {
 
     fn event_error<M: Message>(&self, error: EventOpenError) -> SessionError {
         match error {
-            EventOpenError::DoesNotExist => self.missing::<M>(),
+            EventOpenError::DoesNotExist | EventOpenError::HangsInCreation => self.missing::<M>(),
             EventOpenError::ExceedsMaxNumberOfNodes => no_room(M::TOPIC),
             other => SessionError::Middleware(RuntimeError::of("open event", M::TOPIC.name)(
                 Box::new(other),
