@@ -164,8 +164,11 @@ pub(crate) fn alternatives(found: &Found<'_>) -> Vec<Alternative> {
     alternatives
 }
 
-/// The manoeuvre that separates the two likeliest sets best for its duration; none where they are separated, or where no
-/// manoeuvre would.
+/// Standard deviations at which two sets are told apart for sure.
+const APART: f64 = 4.0;
+
+/// The manoeuvre that separates the two likeliest sets: of those that do so for sure the best for its duration, else the one
+/// that separates them most; none where they are separated, or where no manoeuvre would.
 pub(crate) fn next(
     case: &Case,
     found: &Found<'_>,
@@ -182,15 +185,19 @@ pub(crate) fn next(
         return None;
     }
     let (one, other) = (&found.analysis.fits[first.fit], &found.analysis.fits[second.fit]);
-    let mut best: Option<(f64, f64, usize)> = None;
+    let mut best: Option<((bool, f64), f64, usize)> = None;
     for (i, manoeuvre) in settings.menu.iter().enumerate() {
         let Some(first) = manoeuvre.commands.first() else { continue };
         let duration = manoeuvre.commands.last().map_or(0.0, |last| last.t - first.t).max(1.0);
         let run = imagined(case, &manoeuvre.name, &manoeuvre.commands, duration);
         let imagined = Case { runs: vec![run], ..case.clone() };
         let Some(sigma) = separation(&imagined, found, search, one, other) else { continue };
-        if best.as_ref().is_none_or(|(rate, ..)| sigma / duration.sqrt() > *rate) {
-            best = Some((sigma / duration.sqrt(), sigma, i));
+        let worth = match sigma >= APART {
+            true => (true, sigma / duration.sqrt()),
+            false => (false, sigma),
+        };
+        if best.as_ref().is_none_or(|(known, ..)| worth > *known) {
+            best = Some((worth, sigma, i));
         }
     }
     let (_, sigma, i) = best?;
