@@ -84,6 +84,8 @@ impl Planner {
         if let Err(error) = asked.answer(answered.answer) {
             tracing::warn!(%error, "the client went away before its answer");
         }
+        // A search needs as much as the scene is hard; what stays is not for the next one to be measured by.
+        kerbside_runtime::release_memory();
     }
 }
 

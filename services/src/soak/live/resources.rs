@@ -6,8 +6,10 @@ use std::fs;
 use kerbside_messages::{Nanos, seconds};
 use kerbside_runtime::Instance;
 
-/// A life's first seconds are left out: a process that starts grows \[s\].
-const WARM_UP: f64 = 30.0;
+/// A life's first seconds are not looked at: a process that starts grows \[s\].
+const START: f64 = 30.0;
+/// Nor do the next ones tell a slope, in which it does everything for the first time \[min\].
+const WARM_UP: f64 = 1.5;
 /// Samples are averaged over so long before the fit: neighbours are not independent \[s\].
 const BLOCK: f64 = 10.0;
 /// Fewer blocks tell no slope.
@@ -97,13 +99,13 @@ impl Resources {
         let at = seconds(now.saturating_sub(self.began));
         for (name, pid) in processes.iter().filter(|(_, pid)| *pid > 0) {
             let born = *self.born.entry(*pid).or_insert(at);
-            if at - born < WARM_UP {
+            if at - born < START {
                 continue;
             }
             self.note(name, Resource::Memory, *pid, at, memory(*pid));
             self.note(name, Resource::Descriptors, *pid, at, descriptors(*pid));
         }
-        if at >= WARM_UP {
+        if at >= START {
             self.note("instance", Resource::Segments, 0, at, segments(instance));
         }
     }
@@ -131,7 +133,8 @@ impl Resources {
     }
 }
 
-/// The common slope of all lives, each with a level of its own (ordinary least squares on means of blocks).
+/// The common slope of the later halves of all lives, each with a level of its own (ordinary least squares on means of
+/// blocks): a leak goes on where an allocator that finds its size comes to rest.
 #[must_use]
 pub fn slope(samples: &[Sample]) -> Option<Slope> {
     let lives = blocks(samples);
@@ -172,7 +175,12 @@ fn blocks(samples: &[Sample]) -> Vec<Vec<(f64, f64)>> {
     for ((pid, _), (at, value, count)) in sums {
         lives.entry(pid).or_default().push((at / count, value / count));
     }
-    lives.into_values().collect()
+    let later = |mut life: Vec<(f64, f64)>| {
+        let warm = life.first().map_or(0.0, |first| first.0 + WARM_UP);
+        life.retain(|block| block.0 >= warm);
+        life.split_off(life.len() / 2)
+    };
+    lives.into_values().map(later).collect()
 }
 
 fn memory(pid: u32) -> Option<f64> {
@@ -243,6 +251,15 @@ mod tests {
         let slope = slope(&flat).unwrap();
         assert!(!slope.leaks(Resource::Memory), "{slope:?}");
         assert!(slope.low < 0.0 && slope.high > 0.0);
+    }
+
+    #[test]
+    fn what_comes_to_rest_does_not_leak() {
+        let settles = |life: f64| 90.0 * (1.0 - (-life / 15.0).exp());
+        let samples =
+            samples(2, |pid, at| 8_000.0 + settles(at - 200.0 * f64::from(pid)) + wobble(at));
+        let slope = slope(&samples).unwrap();
+        assert!(!slope.leaks(Resource::Memory), "{slope:?}");
     }
 
     #[test]

@@ -40,7 +40,9 @@ pub use error::RuntimeError;
 pub use instance::{Instance, InstanceError, MAX_NAME};
 pub use lock::{FileLock, LockError};
 pub use peer::Peer;
-pub use process::{close_inherited_on_exec, end_on_broken_pipe, kill, resume, suspend, terminate};
+pub use process::{
+    close_inherited_on_exec, end_on_broken_pipe, kill, release_memory, resume, suspend, terminate,
+};
 pub use publisher::{PlanPublisher, Publisher};
 pub use realtime::{RealtimeReport, RealtimeRequest, enter_realtime, last_core};
 pub use request::{Asked, Client, Pending, Server};

@@ -20,6 +20,16 @@ pub fn end_on_broken_pipe() {
     }
 }
 
+/// Gives memory that was freed back to the system, where the allocator keeps it otherwise: after a job that needed much of
+/// it once. It takes some 0.1 ms; not for the control path.
+pub fn release_memory() {
+    #[cfg(target_env = "gnu")]
+    // SAFETY: the call touches free memory of the allocator alone, under the allocator's own locks.
+    unsafe {
+        libc::malloc_trim(0);
+    }
+}
+
 /// Asks a process to end.
 pub fn terminate(pid: u32) {
     signal(pid, Signal::TERM);

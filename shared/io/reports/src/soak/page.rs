@@ -42,10 +42,16 @@ impl SoakReport {
         let held = self.broken.is_empty() && self.figures.iter().all(|figure| figure.passed);
         let faults = format::plural(self.faults.len() as u64, "fault", "faults");
         let (tone, headline) = if held { (Tone::Good, "Held.") } else { (Tone::Bad, "Broken.") };
-        let sentence = if self.broken.is_empty() {
-            format!("{faults}; every invariant held.")
-        } else {
-            self.broken.join(" ")
+        let missed: Vec<String> = self
+            .figures
+            .iter()
+            .filter(|figure| !figure.passed)
+            .map(|figure| format!("{} {}", figure.name, format::significant(figure.value, 4)))
+            .collect();
+        let sentence = match (self.broken.is_empty(), missed.is_empty()) {
+            (false, _) => self.broken.join(" "),
+            (true, true) => format!("{faults}; every invariant held."),
+            (true, false) => format!("{faults}; beyond its limit: {}.", missed.join(", ")),
         };
         Verdict { tone, headline: headline.to_owned(), sentence }
     }
