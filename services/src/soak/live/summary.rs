@@ -306,7 +306,7 @@ fn slopes(totals: &Totals) -> Vec<SoakSlope> {
             process: process.clone(),
             resource: resource.name().to_owned(),
             slope: slope.map(|slope| [slope.value, slope.low, slope.high]),
-            leaks: slope.is_some_and(|slope| slope.leaks(*resource)),
+            leaks: slope.is_some_and(|slope| slope.leaks(process, *resource)),
             points: samples
                 .into_iter()
                 .flatten()

@@ -174,7 +174,7 @@ impl Totals {
     pub fn leaks(&self) -> Vec<(&str, Resource, Slope)> {
         let mut leaking = Vec::new();
         for (name, resource, slope) in &self.slopes {
-            if let Some(slope) = slope.filter(|slope| slope.leaks(*resource)) {
+            if let Some(slope) = slope.filter(|slope| slope.leaks(name, *resource)) {
                 leaking.push((name.as_str(), *resource, slope));
             }
         }
