@@ -54,7 +54,7 @@ impl<'a> Ready<'a> {
             let measured = follow(run, vehicle);
             let motion = measured.motion(vehicle);
             let binned = Binned::new(run, WIDTH, vehicle.radius, marker);
-            let start = start(run, vehicle, &marker, &motion);
+            let start = start(run, vehicle, &marker, &measured);
             let commands = run.has_commands().then(|| under_way(run, &motion));
             Prepared { run, start, binned, measured, motion, commands, astray: false }
         };
@@ -182,11 +182,12 @@ impl Shown for Simulated<'_> {
 }
 
 /// Where the body was at t = 0: as run.toml says, or as the reference showed while the car stood; without a yaw in the
-/// reference it headed where it went first.
-fn start(run: &Run, vehicle: &Vehicle, marker: &Pose, motion: &InMotion) -> Pose {
+/// reference it headed so that the first way as the wheels tell it lies on the measured one, else where it went first.
+fn start(run: &Run, vehicle: &Vehicle, marker: &Pose, measured: &Followed) -> Pose {
     if let Some(start) = run.start {
         return start;
     }
+    let motion = &measured.motion(vehicle);
     let stood = stood_until(run, vehicle);
     let rows = run.reference.between(f64::NEG_INFINITY, stood);
     let rows = if motion.speed != 0.0 {
@@ -209,7 +210,8 @@ fn start(run: &Run, vehicle: &Vehicle, marker: &Pose, motion: &InMotion) -> Pose
     if yaw.is_finite() {
         return Pose::new(x, y, yaw).compose(&marker.inverse());
     }
-    let heading = first_heading(run, vehicle, (x, y));
+    let heading =
+        laid_on(run, vehicle, measured).unwrap_or_else(|| first_heading(run, vehicle, (x, y)));
     let (sin, cos) = math::sin_cos(heading);
     Pose::new(x - cos * marker.x + sin * marker.y, y - sin * marker.x - cos * marker.y, heading)
 }
@@ -273,6 +275,52 @@ fn stood_until(run: &Run, vehicle: &Vehicle) -> f64 {
         }
     }
     series.span().map_or(0.0, |span| span.1)
+}
+
+/// Way over which the measured path is laid on the one that the wheels tell, and least way that tells a heading, in
+/// wheelbases.
+const LAID: (f64, f64) = (6.0, 1.0);
+
+/// Heading at t = 0 that lays the marker's way as the wheels tell it on its measured one (least squares over all rotations:
+/// Kabsch 1976, in the plane); none where the wheels tell no turn or too little was driven. A marker far from the rear axle
+/// does not go where the car heads.
+fn laid_on(run: &Run, vehicle: &Vehicle, measured: &Followed) -> Option<f64> {
+    if measured.turn == Turn::Nothing {
+        return None;
+    }
+    let (_, end) = run.reference.span()?;
+    let mut trajectory = Trajectory::default();
+    let Followed { speeds, racks, .. } = measured;
+    let (effects, start) = (Effects::NEUTRAL, Pose::default());
+    Follow { vehicle, effects, speeds, racks, start, step: STEP }
+        .trajectory(end.max(0.0) + 0.1, &mut trajectory);
+    let mut pairs: Vec<[f64; 4]> = Vec::new();
+    let (mut way, mut last) = (0.0, None::<(f64, f64)>);
+    for (t, row) in run.reference.t.iter().zip(&run.reference.value) {
+        if *t < 0.0 || !(row[0].is_finite() && row[1].is_finite()) {
+            continue;
+        }
+        let told = trajectory.reference(*t);
+        way += last.map_or(0.0, |(x, y)| math::hypot(told.x - x, told.y - y));
+        last = Some((told.x, told.y));
+        pairs.push([told.x, told.y, row[0], row[1]]);
+        if way > LAID.0 * vehicle.wheelbase {
+            break;
+        }
+    }
+    if way < LAID.1 * vehicle.wheelbase {
+        return None;
+    }
+    let count = to_f64(pairs.len());
+    let mean: [f64; 4] = core::array::from_fn(|c| pairs.iter().map(|p| p[c]).sum::<f64>() / count);
+    let (mut along, mut across) = (0.0, 0.0);
+    for pair in &pairs {
+        let [a, b, c, d]: [f64; 4] = core::array::from_fn(|k| pair[k] - mean[k]);
+        along += a * c + b * d;
+        across += a * d - b * c;
+    }
+    let heading = math::atan2(across, along);
+    heading.is_finite().then_some(heading)
 }
 
 /// Heading of a car whose reference shows no yaw: the direction of its first way, turned about in reverse.

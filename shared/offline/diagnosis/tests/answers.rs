@@ -7,9 +7,10 @@
 mod support;
 
 use kerbside_diagnosis::{Case, DiagnosisError, Settings, Verdict, Wheels, diagnose};
+use kerbside_geometry::Pose;
 use kerbside_simulation::effects::Link;
 use kerbside_simulation::{Effects, Parameter};
-use support::{ALL, Sensors, answer, case, with};
+use support::{ALL, Sensors, answer, case, case_marked, with};
 
 fn finds(id: &str, name: &str, value: f64, link: Link, tolerance: f64) {
     let found = answer(&case(&with(id, name, value), ALL, 1));
@@ -102,6 +103,18 @@ fn a_car_in_good_order_has_nothing() {
     );
     let above: Vec<_> = found.links.iter().filter(|link| link.low > 0.0).collect();
     assert!(above.is_empty(), "{above:?}");
+}
+
+/// A marker far in front of the rear axle does not set out where the car heads.
+#[test]
+fn a_marker_in_front_whose_yaw_nobody_tells_is_no_gap() {
+    for seed in 60..63 {
+        let marker = Pose::new(0.6, 0.1, 0.0);
+        let found = answer(&case_marked(&Effects::NEUTRAL, marker, seed));
+        assert_eq!(found.verdict, Verdict::None, "{}", found.sentence);
+        let gap = found.gap.expect("a reference");
+        assert!(gap.before < 3.0 * gap.floor, "{gap:?}");
+    }
 }
 
 #[test]

@@ -104,6 +104,17 @@ pub(crate) fn case(effects: &Effects, sensors: Sensors, seed: u64) -> Case {
     Case { name: "case".to_owned(), vehicle, allowance: Some(allowance()), runs }
 }
 
+/// The six drives with a reference that shows the position of `marker` alone.
+pub(crate) fn case_marked(effects: &Effects, marker: Pose, seed: u64) -> Case {
+    let mut vehicle = vehicle();
+    vehicle.reference = vehicle.reference.map(|reference| Reference { marker, ..reference });
+    let sensors = Sensors { yaw: false, ..ALL };
+    let runs = (0..6)
+        .map(|drive| run(&vehicle, effects, sensors, seed, (drive, 12.0), |t| asked(drive, t)))
+        .collect();
+    Case { name: "marked".to_owned(), vehicle, allowance: Some(allowance()), runs }
+}
+
 /// A case of one drive of `seconds`: what the six do, one after the other without a rest.
 pub(crate) fn one_log(effects: &Effects, seconds: f64, seed: u64) -> Case {
     let vehicle = vehicle();
