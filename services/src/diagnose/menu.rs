@@ -14,6 +14,10 @@ const FAST: f64 = 0.8;
 const SLOW: f64 = 0.35;
 const WIDE: f64 = 0.8;
 const NARROW: f64 = 0.4;
+/// Nearly all of a limit, in curves where the side force stays below this acceleration \[m/s^2\]: what grows with the square of
+/// the speed shows there.
+const TOP: f64 = 0.95;
+const SIDE: f64 = 4.0;
 
 /// A stretch: how long it lasts \[s\], and speed and steering as shares of the limits.
 type Stretch = (f64, f64, f64);
@@ -25,7 +29,9 @@ pub fn of(vehicle: &Vehicle) -> Vec<Manoeuvre> {
     let drive = (4.0 * beat).max(4.0);
     let step = (1.2 * beat).max(1.5);
     let driven = |name: &str, stretches: &[Stretch]| stretched(vehicle, name, stretches);
-    vec![
+    let side = (TOP * vehicle.limits.speed).powi(2) * math::tan(TOP * vehicle.limits.steering)
+        / vehicle.wheelbase;
+    let mut menu = vec![
         driven("standing still", &[(8.0, 0.0, 0.0)]),
         driven(
             "straight, there and back",
@@ -87,7 +93,12 @@ pub fn of(vehicle: &Vehicle) -> Vec<Manoeuvre> {
             "reversing in an S",
             &[(drive, -SLOW, WIDE), (drive, -SLOW, -WIDE), (0.5 * drive, -SLOW, 0.0)],
         ),
-    ]
+    ];
+    if side <= SIDE {
+        let angles = [(drive, TOP, NARROW), (drive, TOP, TOP), (drive, SLOW, TOP)];
+        menu.push(driven("circle at two angles, at top speed", &angles));
+    }
+    menu
 }
 
 fn command(vehicle: &Vehicle, t: f64, speed: f64, steering: f64) -> Command {

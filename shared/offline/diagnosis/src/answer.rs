@@ -1,8 +1,8 @@
 //! The answer's effects, its alternatives, and what to drive next.
 
 use kerbside_geometry::math;
-use kerbside_simulation::Effects;
 use kerbside_simulation::effects::ParameterDefinition;
+use kerbside_simulation::{Command, Effects};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -164,11 +164,44 @@ pub(crate) fn alternatives(found: &Found<'_>) -> Vec<Alternative> {
     alternatives
 }
 
-/// Standard deviations at which two sets are told apart for sure.
-const APART: f64 = 4.0;
+/// Standard deviations, by the simulator, at which a drive tells two sets apart for sure: a real vehicle is not quite as any
+/// effect says, and shows less.
+const APART: f64 = 8.0;
+/// A drive that shows less than this is no use.
+const USELESS: f64 = 2.0;
+/// Time between two repetitions \[s\].
+const STILL: f64 = 0.5;
+/// A manoeuvre is driven so often at most.
+const REPEATS: u32 = 4;
 
-/// The manoeuvre that separates the two likeliest sets: of those that do so for sure the best for its duration, else the one
-/// that separates them most; none where they are separated, or where no manoeuvre would.
+/// What a manoeuvre is worth that is repeated until it tells for sure, or as often as it may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Worth {
+    sigma: f64,
+    seconds: f64,
+    repeats: u32,
+}
+
+impl Worth {
+    fn of(sigma: f64, duration: f64) -> Self {
+        let enough = (1..=REPEATS).find(|n| sigma * f64::from(*n).sqrt() >= APART);
+        let repeats = enough.unwrap_or(REPEATS);
+        let times = f64::from(repeats);
+        Self { sigma: sigma * times.sqrt(), seconds: duration * times, repeats }
+    }
+
+    /// Whether it is the better choice: what is sure comes first, then what is short, else what shows most.
+    fn beats(&self, other: &Self) -> bool {
+        match (self.sigma >= APART, other.sigma >= APART) {
+            (true, true) => self.seconds < other.seconds,
+            (false, false) => self.sigma > other.sigma,
+            (sure, _) => sure,
+        }
+    }
+}
+
+/// The manoeuvre that separates the two likeliest sets: the shortest that does so for sure, repeated where that helps, else
+/// the one that separates them most; none where they are separated, or where no manoeuvre would with these sensors.
 pub(crate) fn next(
     case: &Case,
     found: &Found<'_>,
@@ -185,31 +218,42 @@ pub(crate) fn next(
         return None;
     }
     let (one, other) = (&found.analysis.fits[first.fit], &found.analysis.fits[second.fit]);
-    let mut best: Option<((bool, f64), f64, usize)> = None;
+    let mut best: Option<(Worth, usize)> = None;
     for (i, manoeuvre) in settings.menu.iter().enumerate() {
         let Some(first) = manoeuvre.commands.first() else { continue };
         let duration = manoeuvre.commands.last().map_or(0.0, |last| last.t - first.t).max(1.0);
         let run = imagined(case, &manoeuvre.name, &manoeuvre.commands, duration);
         let imagined = Case { runs: vec![run], ..case.clone() };
         let Some(sigma) = separation(&imagined, found, search, one, other) else { continue };
-        let worth = match sigma >= APART {
-            true => (true, sigma / duration.sqrt()),
-            false => (false, sigma),
-        };
-        if best.as_ref().is_none_or(|(known, ..)| worth > *known) {
-            best = Some((worth, sigma, i));
+        let worth = Worth::of(sigma, duration);
+        if best.as_ref().is_none_or(|(known, _)| worth.beats(known)) {
+            best = Some((worth, i));
         }
     }
-    let (_, sigma, i) = best?;
+    let (worth, i) = best.filter(|(worth, _)| worth.sigma >= USELESS)?;
     let manoeuvre = &settings.menu[i];
     let ids =
         |fit: &Fit| fit.set.iter().map(|c| search.candidates[*c].definition.id).collect::<Vec<_>>();
     Some(Next {
-        manoeuvre: manoeuvre.name.clone(),
+        manoeuvre: match worth.repeats {
+            1 => manoeuvre.name.clone(),
+            times => format!("{}, {times} times", manoeuvre.name),
+        },
         separates: vec![ids(one), ids(other)],
-        sigma,
-        commands: manoeuvre.commands.iter().map(|c| (c.t, c.speed, c.steering)).collect(),
+        sigma: worth.sigma,
+        commands: repeated(&manoeuvre.commands, worth.repeats),
     })
+}
+
+/// Commands one time after the other, as (t, speed, steering); each begins where the one before has ended.
+fn repeated(commands: &[Command], times: u32) -> Vec<(f64, f64, f64)> {
+    let period = match commands {
+        [first, .., last] => last.t - first.t + STILL,
+        _ => 0.0,
+    };
+    let once =
+        |n: u32| commands.iter().map(move |c| (c.t + f64::from(n) * period, c.speed, c.steering));
+    (0..times).flat_map(once).collect()
 }
 
 /// By how many standard deviations of the noise one set, driven, differs from the other fitted to it.
@@ -233,12 +277,7 @@ fn separation(
 }
 
 /// A run that was not driven, with the sensors that the case has, at their mean rates.
-fn imagined(
-    case: &Case,
-    name: &str,
-    commands: &[kerbside_simulation::Command],
-    duration: f64,
-) -> Run {
+fn imagined(case: &Case, name: &str, commands: &[Command], duration: f64) -> Run {
     let model = &case.runs[0];
     let grid = |series: Option<(f64, f64)>, rows: usize| -> Vec<f64> {
         let Some((begin, end)) = series else { return Vec::new() };
@@ -315,5 +354,32 @@ impl crate::candidate::Candidate {
                 )
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_sure_and_short_is_driven_first_and_what_is_not_sure_is_repeated() {
+        let (sure, longer) = (Worth::of(9.0, 20.0), Worth::of(30.0, 25.0));
+        assert!(sure.beats(&longer) && !longer.beats(&sure));
+        let twice = Worth::of(6.0, 9.0);
+        assert_eq!((twice.repeats, twice.seconds), (2, 18.0));
+        assert!(twice.beats(&sure) && twice.sigma > APART);
+        let (weak, weaker) = (Worth::of(1.5, 60.0), Worth::of(1.0, 10.0));
+        assert_eq!((weak.repeats, weak.sigma), (REPEATS, 3.0));
+        assert!(weak.beats(&weaker) && sure.beats(&weak) && !weak.beats(&sure));
+    }
+
+    #[test]
+    fn a_repetition_begins_where_the_one_before_has_ended() {
+        let command = |t, speed| Command { t, speed, steering: 0.1 };
+        let commands = [command(0.0, 0.0), command(2.0, 0.5), command(4.0, 0.0)];
+        let twice = repeated(&commands, 2);
+        let times: Vec<f64> = twice.iter().map(|row| row.0).collect();
+        assert_eq!(times, [0.0, 2.0, 4.0, 4.5, 6.5, 8.5]);
+        assert_eq!(twice[4], (6.5, 0.5, 0.1));
     }
 }
