@@ -169,7 +169,11 @@ impl Soak {
                 interrupted: stop.load(Ordering::Relaxed) || self.is_over(),
             };
             match manoeuvre.step(now(), &seen) {
-                Act::End(end) => break end,
+                Act::End(end) => {
+                    // Done lasts until the next request, which follows at once.
+                    self.inject(stack, &trace);
+                    break end;
+                }
                 act => self.act(stack, act, &trace),
             }
             self.inject(stack, &trace);
@@ -303,6 +307,7 @@ impl Soak {
                 self.disturbed = sight.now;
             }
             Some(Wish::StartAnew) => stack.wants_anew = true,
+            Some(Wish::Miss(process, blow, mode)) => self.totals.missed(process, blow, mode),
             None => {}
         }
     }

@@ -70,6 +70,8 @@ pub enum Wish {
     First(Process),
     /// Start the stack anew: the mode aimed at is its first.
     StartAnew,
+    /// The mode aimed at did not come: nobody is struck.
+    Miss(Process, Blow, Mode),
 }
 
 /// What is seen of the stack when a wish is made.
@@ -194,6 +196,8 @@ pub struct Matrix {
     queue: VecDeque<Aim>,
     /// What had to come first was done at.
     prepared: Option<Nanos>,
+    /// The first of the queue is waited for since.
+    since: Option<Nanos>,
 }
 
 /// The modes of a running stack.
@@ -209,6 +213,8 @@ pub const MODES: [Mode; 7] = [
 
 /// What is waited for at most so long after what had to come first \[ns\].
 const PATIENCE: Nanos = 4_000 * MS;
+/// A mode that has not come for so long is given up: several manoeuvres \[ns\].
+const GIVEN_UP: Nanos = 120_000 * MS;
 
 impl Matrix {
     /// The whole matrix.
@@ -221,7 +227,7 @@ impl Matrix {
                 [Blow::Kill, Blow::Stall(1_500 * MS)].map(|blow| Aim { process, blow, mode })
             })
         });
-        Self { queue: aims.collect(), prepared: None }
+        Self { queue: aims.collect(), prepared: None, since: None }
     }
 
     /// How many there are to go.
@@ -234,8 +240,13 @@ impl Matrix {
         let aim = *self.queue.front()?;
         if sight.mode == aim.mode && sight.exists(aim.process) && self.is_reached(&aim, sight) {
             self.queue.pop_front();
-            self.prepared = None;
+            (self.prepared, self.since) = (None, None);
             return Some(Wish::Strike(aim.process, aim.blow));
+        }
+        if sight.now - *self.since.get_or_insert(sight.now) > GIVEN_UP {
+            self.queue.pop_front();
+            (self.prepared, self.since) = (None, None);
+            return Some(Wish::Miss(aim.process, aim.blow, aim.mode));
         }
         if self.prepared.is_some_and(|at| sight.now - at < PATIENCE) {
             return None;
@@ -289,6 +300,16 @@ mod tests {
         struck.sort_by_key(|(process, blow, mode)| (*process, *blow, *mode as u8));
         struck.dedup();
         assert_eq!(struck.len(), 8 * 2 * 7);
+    }
+
+    #[test]
+    fn a_mode_that_never_comes_is_given_up_and_said() {
+        let mut matrix = Matrix::whole();
+        let first = sight(MS, Mode::Driving);
+        assert_eq!(matrix.wish(&first), Some(Wish::StartAnew));
+        let later = Sight { now: 2 * MS + GIVEN_UP, ..first };
+        assert!(matches!(matrix.wish(&later), Some(Wish::Miss(_, Blow::Kill, Mode::Starting))));
+        assert_eq!(matrix.left(), 8 * 2 * 7 - 1);
     }
 
     #[test]
