@@ -29,8 +29,6 @@ pub fn of(vehicle: &Vehicle) -> Vec<Manoeuvre> {
     let drive = (4.0 * beat).max(4.0);
     let step = (1.2 * beat).max(1.5);
     let driven = |name: &str, stretches: &[Stretch]| stretched(vehicle, name, stretches);
-    let side = (TOP * vehicle.limits.speed).powi(2) * math::tan(TOP * vehicle.limits.steering)
-        / vehicle.wheelbase;
     let mut menu = vec![
         driven("standing still", &[(8.0, 0.0, 0.0)]),
         driven(
@@ -55,17 +53,7 @@ pub fn of(vehicle: &Vehicle) -> Vec<Manoeuvre> {
             "arc, there and back",
             &[(drive, FAST, WIDE), (1.5, 0.0, WIDE), (drive, -FAST, WIDE)],
         ),
-        driven(
-            "steps of the steering, large and small",
-            &[
-                (step, SLOW, WIDE),
-                (step, SLOW, -WIDE),
-                (step, SLOW, NARROW),
-                (step, SLOW, 0.1),
-                (step, SLOW, -0.1),
-                (step, SLOW, 0.0),
-            ],
-        ),
+        driven("steps of the steering, large and small", &steering_steps(step)),
         driven(
             "steps of the speed, large and small",
             &[
@@ -94,11 +82,21 @@ pub fn of(vehicle: &Vehicle) -> Vec<Manoeuvre> {
             &[(drive, -SLOW, WIDE), (drive, -SLOW, -WIDE), (0.5 * drive, -SLOW, 0.0)],
         ),
     ];
-    if side <= SIDE {
-        let angles = [(drive, TOP, NARROW), (drive, TOP, TOP), (drive, SLOW, TOP)];
-        menu.push(driven("circle at two angles, at top speed", &angles));
-    }
+    menu.extend(fast_circle(vehicle, drive));
     menu
+}
+
+/// Large and small steps of the steering, each for `step` \[s\].
+fn steering_steps(step: f64) -> [Stretch; 6] {
+    [WIDE, -WIDE, NARROW, 0.1, -0.1, 0.0].map(|angle| (step, SLOW, angle))
+}
+
+/// A circle at two angles nearly at top speed, and slowly; none where the side force would be too large.
+fn fast_circle(vehicle: &Vehicle, drive: f64) -> Option<Manoeuvre> {
+    let curvature = math::tan(TOP * vehicle.limits.steering) / vehicle.wheelbase;
+    let angles = [(drive, TOP, NARROW), (drive, TOP, TOP), (drive, SLOW, TOP)];
+    ((TOP * vehicle.limits.speed).powi(2) * curvature <= SIDE)
+        .then(|| stretched(vehicle, "circle at two angles, at top speed", &angles))
 }
 
 fn command(vehicle: &Vehicle, t: f64, speed: f64, steering: f64) -> Command {

@@ -59,8 +59,9 @@ pub fn soak(args: &SoakArgs, folder: &Path, stop: &AtomicBool) -> Result<Totals,
     while soak.goes_on(stop) {
         let Some(present) = &mut stack else { break };
         let end = soak.manoeuvre(present, &mut burdens, stop)?;
-        if matches!(end, Ended::Lost) && soak.goes_on(stop) {
-            let place = present.place();
+        if end != Ended::Well && soak.goes_on(stop) {
+            let start = Place::of(&soak.job.scenario.start);
+            let place = if end == Ended::Stuck { start } else { present.place() };
             drop(stack.take());
             stack = Some(Stack::start(&soak.job, place, stop)?);
         }
@@ -79,6 +80,8 @@ enum Ended {
     Well,
     /// It has to be started anew.
     Lost,
+    /// No path leads from where the vehicle was stopped: somebody carries it to where it began.
+    Stuck,
 }
 
 struct Soak {
@@ -381,6 +384,10 @@ impl Soak {
         }
         if end == End::Completed {
             self.outward = !self.outward;
+        }
+        if matches!(end, End::NoPlan(kerbside_messages::PlanVerdict::NoPath)) {
+            self.outward = false;
+            return Ok(Ended::Stuck);
         }
         Ok(if lost || matches!(end, End::Stopped(kerbside_messages::Cause::GaveUp)) {
             Ended::Lost
