@@ -172,11 +172,7 @@ impl Soak {
                 interrupted: stop.load(Ordering::Relaxed) || self.is_over(),
             };
             match manoeuvre.step(now(), &seen) {
-                Act::End(end) => {
-                    // Done lasts until the next request, which follows at once.
-                    self.inject(stack, &trace);
-                    break end;
-                }
+                Act::End(end) => break end,
                 act => self.act(stack, act, &trace),
             }
             self.inject(stack, &trace);

@@ -198,6 +198,8 @@ pub struct Matrix {
     prepared: Option<Nanos>,
     /// The first of the queue is waited for since.
     since: Option<Nanos>,
+    /// A mode that was given up: done, where the vehicle stands at its plan's end, lasts a cycle.
+    absent: Option<Mode>,
 }
 
 /// The modes of a running stack.
@@ -227,7 +229,7 @@ impl Matrix {
                 [Blow::Kill, Blow::Stall(1_500 * MS)].map(|blow| Aim { process, blow, mode })
             })
         });
-        Self { queue: aims.collect(), prepared: None, since: None }
+        Self { queue: aims.collect(), prepared: None, since: None, absent: None }
     }
 
     /// How many there are to go.
@@ -243,7 +245,9 @@ impl Matrix {
             (self.prepared, self.since) = (None, None);
             return Some(Wish::Strike(aim.process, aim.blow));
         }
-        if sight.now - *self.since.get_or_insert(sight.now) > GIVEN_UP {
+        let waited = sight.now - *self.since.get_or_insert(sight.now);
+        if waited > GIVEN_UP || self.absent == Some(aim.mode) {
+            self.absent = Some(aim.mode);
             self.queue.pop_front();
             (self.prepared, self.since) = (None, None);
             return Some(Wish::Miss(aim.process, aim.blow, aim.mode));
@@ -310,6 +314,10 @@ mod tests {
         let later = Sight { now: 2 * MS + GIVEN_UP, ..first };
         assert!(matches!(matrix.wish(&later), Some(Wish::Miss(_, Blow::Kill, Mode::Starting))));
         assert_eq!(matrix.left(), 8 * 2 * 7 - 1);
+        // Its other aims are not waited for.
+        let rest = (0..15).filter_map(|_| matrix.wish(&later));
+        assert!(rest.into_iter().all(|wish| matches!(wish, Wish::Miss(_, _, Mode::Starting))));
+        assert_eq!(matrix.left(), 8 * 2 * 6);
     }
 
     #[test]

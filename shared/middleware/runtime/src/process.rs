@@ -21,7 +21,7 @@ pub fn end_on_broken_pipe() {
 }
 
 /// Gives memory that was freed back to the system, where the allocator keeps it otherwise: after a job that needed much of
-/// it once. It takes some 0.1 ms; not for the control path.
+/// it once. Not for the control path.
 pub fn release_memory() {
     #[cfg(target_env = "gnu")]
     // SAFETY: the call touches free memory of the allocator alone, under the allocator's own locks.

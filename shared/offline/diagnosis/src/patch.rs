@@ -307,7 +307,15 @@ fn poses(bench: &Bench<'_>, run: usize) -> Vec<(f64, f64)> {
     let binned = &bench.ready.runs[run].binned;
     let measured = binned.measured.iter().map(|row| (row[REFERENCE], row[REFERENCE + 1]));
     let known = |(x, y): (f64, f64)| binned.has_yaw && x.is_finite() && y.is_finite();
-    let predicted = bench.paths[run].pose.iter().map(|pose| (pose.x, pose.y));
+    // Without a yaw the compared point is the marker.
+    let (mx, my) = match (binned.has_yaw, bench.ready.vehicle.reference) {
+        (false, Some(reference)) => (reference.marker.x, reference.marker.y),
+        _ => (0.0, 0.0),
+    };
+    let predicted = bench.paths[run].pose.iter().map(|pose| {
+        let (sin, cos) = math::sin_cos(pose.yaw);
+        (pose.x - cos * mx + sin * my, pose.y - sin * mx - cos * my)
+    });
     predicted.zip(measured).map(|(path, seen)| if known(seen) { seen } else { path }).collect()
 }
 
