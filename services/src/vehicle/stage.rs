@@ -7,6 +7,8 @@ use kerbside_geometry::{Pose, Vehicle};
 use kerbside_line::{Frame, Hello, Sensors, VehicleEnd, VehicleEvent};
 use kerbside_messages::{Header, Nanos, Truth, nanos, seconds};
 use kerbside_simulation::{Effects, Noise, Simulator};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 /// What a simulated vehicle is made of.
 #[derive(Clone, Debug)]
@@ -57,7 +59,7 @@ impl VehicleStage {
             time: 0,
             silent: true,
             hello,
-            zero: [0; 4],
+            zero: driven_before(making).map(|count| -count),
             clock: 0,
         }
     }
@@ -140,6 +142,17 @@ impl VehicleStage {
             ..Truth::default()
         };
     }
+}
+
+/// Where the counters stand when the board has long been up: each somewhere, none near its zero.
+fn driven_before(making: &Making) -> [i64; 4] {
+    let bits = making.vehicle.encoders.map_or(32, |encoders| encoders.counter_bits);
+    let least = 1_i64 << bits.clamp(4, 28).saturating_sub(3);
+    let mut random = Pcg64::seed_from_u64(making.seed ^ 0x0d0_5e7e5);
+    [0; 4].map(|_: i64| {
+        let count = random.random_range(least..2 * least);
+        if random.random_bool(0.5) { count } else { -count }
+    })
 }
 
 /// Time between readings \[ns\]: that of the fastest sensor.

@@ -35,6 +35,16 @@ impl Gap {
         let around = (factor - 1.0) * held.abs() + factor * (gained + speed.abs() * GAP_SLACK);
         (turned - held).abs() > around + slack
     }
+
+    /// How far a wheel up to `factor` times as fast as the vehicle comes in the time \[m\].
+    fn reach(&self, factor: f64) -> f64 {
+        let elapsed = self.elapsed + GAP_SLACK;
+        let most = self.top_speed * elapsed;
+        let way = self.speed.map_or(most, |speed| {
+            speed.abs() * elapsed + 0.5 * self.acceleration * elapsed * elapsed
+        });
+        factor * way.min(most)
+    }
 }
 
 /// What a travel brought.
@@ -183,19 +193,39 @@ impl Odometer {
 
     /// Whether a wheel has turned over a gap as none can: farther than its top speed carries it,
     /// or so far off the way that the speed before the gap foretells that no acceleration explains
-    /// it, or maybe so far that absolute counts no longer tell. Counters that began anew unseen are
-    /// told by that.
+    /// it, or maybe so far that absolute counts no longer tell; or whether the counters may have
+    /// begun anew unseen.
     pub(crate) fn beyond_belief(&self, gap: &Gap) -> bool {
         let used = |index: &usize| self.needed[*index] && !self.lost[*index];
-        (0..4).filter(used).any(|index| {
+        self.may_have_begun_anew(gap)
+            || (0..4).filter(used).any(|index| {
+                let scale = &self.scales[index];
+                let turned = self.unapplied(index);
+                let counts = 2.0 * scale.metres_per_count;
+                let reach = GAP_MARGIN * scale.top_speed * (gap.elapsed + GAP_SLACK);
+                turned.abs() > reach + counts
+                    || gap.contradicts(turned, scale.top_speed / gap.top_speed, counts)
+                    || scale.top_speed * gap.elapsed > 0.5 * scale.ring()
+            })
+    }
+
+    /// Whether all counters are as near their zero as they would be had they begun anew within the
+    /// gap: how far the vehicle came before that, nobody knows. Over a gap as short as the slack
+    /// that is no way to speak of, and counters that read what they did before have not moved.
+    fn may_have_begun_anew(&self, gap: &Gap) -> bool {
+        if gap.elapsed <= GAP_SLACK {
+            return false;
+        }
+        let used = |index: &usize| self.needed[*index] && !self.lost[*index];
+        let counts = |index: usize| 2.0 * self.scales[index].metres_per_count;
+        let near_zero = |index: usize| {
             let scale = &self.scales[index];
-            let turned = self.unapplied(index);
-            let counts = 2.0 * scale.metres_per_count;
-            let reach = GAP_MARGIN * scale.top_speed * (gap.elapsed + GAP_SLACK);
-            turned.abs() > reach + counts
-                || gap.contradicts(turned, scale.top_speed / gap.top_speed, counts)
-                || scale.top_speed * gap.elapsed > 0.5 * scale.ring()
-        })
+            scale.metres_per_count > 0.0
+                && self.newest[index].abs()
+                    <= gap.reach(scale.top_speed / gap.top_speed) + counts(index)
+        };
+        (0..4).filter(used).all(near_zero)
+            && (0..4).filter(used).any(|index| self.unapplied(index).abs() > counts(index))
     }
 
     /// The pose has taken up all that was read.

@@ -85,8 +85,9 @@ impl Counter {
     /// Takes `count`, read at `time` \[s\].
     ///
     /// A value out of line is one that no wheel reaches, or that lies behind where the wheel came from. A single one is
-    /// `Implausible` and leaves no trace: the next one is measured from the last accepted. Three in a row that agree with one another but not with it, or eight
-    /// that agree with nothing, are a counter that jumped: `Lost`.
+    /// `Implausible` and leaves no trace: the next one is measured from the last accepted. Three in a row that agree with one
+    /// another but not with it, or eight that agree with nothing, are a counter that jumped: `Lost`. So is one after a gap as
+    /// long as eight readings: the vehicle has come too far meanwhile to wait for more.
     pub(crate) fn read(&mut self, count: i64, time: f64, bounds: &Bounds) -> Judgement {
         let reading = Reading { count, time };
         let Some(accepted) = self.accepted else {
@@ -129,7 +130,9 @@ impl Counter {
         self.agreeing = if agrees { self.agreeing + 1 } else { 1 };
         self.refused += 1;
         self.suspect = Some(reading);
-        if self.agreeing >= AGREEING || self.refused >= REFUSED_IN_A_ROW {
+        let patience = f64::from(REFUSED_IN_A_ROW) * bounds.shortest;
+        let unread = self.accepted.is_none_or(|accepted| reading.time - accepted.time > patience);
+        if unread || self.agreeing >= AGREEING || self.refused >= REFUSED_IN_A_ROW {
             return Judgement::Lost;
         }
         Judgement::Implausible
@@ -221,6 +224,13 @@ mod tests {
         assert_eq!(judged[2], Judgement::Implausible);
         assert_eq!(judged[3], Judgement::Turned(0.004));
         assert_eq!(counter.travel(), 0.008);
+    }
+
+    #[test]
+    fn after_a_gap_an_outlier_is_a_lost_counter() {
+        let mut counter = counter(32);
+        read_all(&mut counter, &[900, 902, 904]);
+        assert_eq!(counter.read(1, 0.3, &BOUNDS), Judgement::Lost);
     }
 
     #[test]
