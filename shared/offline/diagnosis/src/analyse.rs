@@ -84,7 +84,12 @@ pub(crate) fn analyse<'a>(
     let nothing = search::nothing(&search)?;
     let fits = Hypotheses::full(&search, &earlier).all();
     progress("what is not listed", 0.8);
-    let shapes = rivals::shapes(&bench);
+    let residuals: Vec<Whole> = [Some(&nothing), fits.first()]
+        .into_iter()
+        .flatten()
+        .map(|f| bench.whole(&f.effects))
+        .collect();
+    let shapes = rivals::shapes(&bench, &residuals.iter().collect::<Vec<_>>());
     let beside_nothing = ranked(&bench, &search, &nothing, &shapes);
     let beside_best =
         fits.first().map(|best| ranked(&bench, &search, best, &shapes)).unwrap_or_default();
@@ -142,7 +147,7 @@ fn beside(bench: &Bench<'_>, all: &[Candidate], fit: &Fit) -> Vec<Vec<Vec<Channe
     let Some(projection) = search.projection(&fit.set, &bench.all()) else { return columns };
     let whole = bench.whole(&fit.effects);
     let mut along = search.slopes(fit, &whole, &projection);
-    let mut shapes = rivals::shapes(bench);
+    let mut shapes = rivals::shapes(bench, &[&whole]);
     for _ in 0..GROUPS {
         let evidence = |group: &Shapes| {
             rivals::judge(bench, &projection, &whole, &along, group)

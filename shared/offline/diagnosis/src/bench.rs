@@ -2,10 +2,11 @@
 
 use kerbside_geometry::{Drive, WHEELS};
 use kerbside_simulation::Effects;
+use kerbside_simulation::effects::Link;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::bins::{CHANNELS, Channels, GYRO, to_f64};
+use crate::bins::{CHANNELS, Channels, GYRO, STEERING, to_f64};
 use crate::generic::Extent;
 use crate::linear::{Design, Projection, gram};
 use crate::noise::{Coefficients, Evidence, Noise, OF_WHEEL, Whitener};
@@ -256,7 +257,8 @@ fn late(base: &[Channels], channel: usize, width: f64) -> Vec<Channels> {
     column
 }
 
-/// Sensitivity of a run's residuals to a nuisance of one standard deviation.
+/// Sensitivity of a run's residuals to a nuisance of one standard deviation. What motor or rack make of a command may be
+/// cut off at the vehicle's limits: to the other side it is not.
 fn column(
     ready: &Ready<'_>,
     run: usize,
@@ -265,7 +267,23 @@ fn column(
     base: &[Channels],
     nuisance: &Nuisance,
 ) -> Vec<Channels> {
-    let mut effects = *about;
-    effects.set(nuisance.parameter, effects.get(nuisance.parameter) + nuisance.deviation);
-    residuals(&ready.runs[run].binned, path, &ready.predicted(run, &effects), base)
+    let binned = &ready.runs[run].binned;
+    let off = |by: f64| {
+        let mut effects = *about;
+        effects.set(nuisance.parameter, effects.get(nuisance.parameter) + by);
+        ready.predicted(run, &effects)
+    };
+    let more = residuals(binned, path, &off(nuisance.deviation), base);
+    let link = nuisance.parameter.effect().link;
+    if !matches!(link, Link::SpeedActuation | Link::SteeringActuation) {
+        return more;
+    }
+    let less = residuals(binned, path, base, &off(-nuisance.deviation));
+    if commanded(&less) > commanded(&more) { less } else { more }
+}
+
+/// How much wheels and steering sensor show of a column.
+fn commanded(column: &[Channels]) -> f64 {
+    let values = column.iter().flat_map(|row| &row[..=STEERING]);
+    values.filter(|value| value.is_finite()).map(|value| value * value).sum()
 }

@@ -2,6 +2,8 @@
 //! small set of shapes, linear in their sizes, and competes with the listed effects as a rival: this is what `unknown`
 //! rests on.
 
+use core::f64::consts::TAU;
+
 use kerbside_geometry::math;
 use kerbside_simulation::effects::Link;
 
@@ -53,8 +55,15 @@ pub(crate) enum Axis {
     Heading,
     /// Place in the reference frame.
     Place,
+    /// The same, four times as closely or so.
+    Spot,
     /// Angle of the wheel.
     Turn,
+    /// Nothing but time, round and round; each run begins anywhere in it.
+    Oscillation {
+        /// How often \[mHz\].
+        millihertz: u32,
+    },
 }
 
 impl Entry {
@@ -111,8 +120,8 @@ impl Entry {
 }
 
 impl Axis {
-    /// All of them.
-    pub(crate) const ALL: [Self; 9] = [
+    /// All of them, but for oscillations: their frequencies are in the runs.
+    pub(crate) const ALL: [Self; 10] = [
         Self::Time,
         Self::Direction,
         Self::Speed,
@@ -121,6 +130,7 @@ impl Axis {
         Self::SteeringRate,
         Self::Heading,
         Self::Place,
+        Self::Spot,
         Self::Turn,
     ];
 
@@ -128,6 +138,7 @@ impl Axis {
     #[must_use]
     pub(crate) fn words(self) -> &'static str {
         match self {
+            Self::Oscillation { .. } => "the time, which swings,",
             Self::Time => "the time since the start of the run",
             Self::Direction => "whether the car goes forwards or in reverse",
             Self::Speed => "the speed",
@@ -135,7 +146,7 @@ impl Axis {
             Self::Curvature => "the curvature of the path",
             Self::SteeringRate => "which way the steering turns",
             Self::Heading => "the heading",
-            Self::Place => "the place",
+            Self::Place | Self::Spot => "the place",
             Self::Turn => "the angle of the wheel",
         }
     }
@@ -156,6 +167,8 @@ pub(crate) struct Extent {
     pub wheelbase: f64,
     /// Nominal radii \[m\].
     pub radius: [f64; 4],
+    /// Middles of spots along the paths, and how far apart they lie \[m\].
+    pub spots: (Vec<(f64, f64)>, f64),
 }
 
 impl Extent {
@@ -169,6 +182,7 @@ impl Extent {
             curvature: 1e-3 / wheelbase,
             wheelbase,
             radius,
+            spots: (Vec::new(), wheelbase),
         };
         for path in paths {
             for pose in &path.pose {
@@ -181,12 +195,40 @@ impl Extent {
                 extent.curvature = extent.curvature.max(math::tan(step.steering).abs() / wheelbase);
             }
         }
+        extent.spots = spots(paths, extent.place, wheelbase);
         extent
+    }
+}
+
+/// Squares that the paths enter, as small as can be without being more than [`SPOTS`].
+fn spots(paths: &[&Path], place: [f64; 4], wheelbase: f64) -> (Vec<(f64, f64)>, f64) {
+    let [x0, y0, x1, y1] = place;
+    let side = (x1 - x0).max(y1 - y0).max(wheelbase);
+    let entered = |pitch: f64| {
+        let middle =
+            |value: f64, from: f64| from + pitch * (((value - from) / pitch).floor() + 0.5);
+        let poses = paths.iter().flat_map(|path| &path.pose);
+        let mut all: Vec<(f64, f64)> =
+            poses.map(|pose| (middle(pose.x, x0), middle(pose.y, y0))).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        all.dedup();
+        all
+    };
+    let mut pitch = (0.5 * wheelbase).max(side / CLOSEST);
+    loop {
+        let all = entered(pitch);
+        if all.len() <= SPOTS || pitch >= side {
+            return (all, pitch);
+        }
+        pitch *= 1.15;
     }
 }
 
 /// Number of shapes along each side of the map.
 const GRID: usize = 4;
+/// Spots along the paths at most, and along a side of the map.
+const SPOTS: usize = 40;
+const CLOSEST: f64 = 16.0;
 
 /// Size of each shape in each bin: `[shape][bin]`.
 #[must_use]
@@ -232,26 +274,37 @@ pub(crate) fn shapes(
             vec![over(&|k| math::cos(path.pose[k].yaw)), over(&|k| math::sin(path.pose[k].yaw))]
         }
         Axis::Place => places(path, extent),
-        Axis::Turn => {
-            let wheel = if let Entry::Wheel(wheel) = entry { wheel } else { 2 };
-            let mut turn = 0.0;
-            let turns: Vec<f64> = (0..bins)
-                .map(|k| {
-                    if k > 0 {
-                        turn += path.steps[k - 1].distance / extent.radius[wheel];
-                    }
-                    turn
-                })
-                .collect();
-            // Faster than the bins can show it is nothing that they show.
-            let shown =
-                |k: usize| (1.0 - (speed(k) * width / extent.radius[wheel] / 3.0).powi(2)).max(0.0);
-            vec![
-                over(&|k| shown(k) * math::cos(turns[k])),
-                over(&|k| shown(k) * math::sin(turns[k])),
-            ]
+        Axis::Spot => {
+            let (middles, pitch) = &extent.spots;
+            middles.iter().map(|middle| bump(path, *middle, *pitch)).collect()
         }
+        Axis::Oscillation { millihertz } => {
+            let phase = |k: usize| TAU * 1e-3 * f64::from(millihertz) * width * bins::to_f64(k);
+            vec![over(&|k| math::cos(phase(k))), over(&|k| math::sin(phase(k)))]
+        }
+        Axis::Turn => turns(entry, path, extent),
     }
+}
+
+/// The angle of a wheel, round and round.
+fn turns(entry: Entry, path: &Path, extent: &Extent) -> Vec<Vec<f64>> {
+    let wheel = if let Entry::Wheel(wheel) = entry { wheel } else { 2 };
+    let rolled =
+        |k: usize| if k > 0 { path.steps[k - 1].distance / extent.radius[wheel] } else { 0.0 };
+    let mut turn = 0.0;
+    let turns: Vec<f64> = (0..path.pose.len())
+        .map(|k| {
+            turn += rolled(k);
+            turn
+        })
+        .collect();
+    // Faster than the bins can show it is nothing that they show.
+    let per_bin = |k: usize| path.steps[k.saturating_sub(1).min(path.steps.len() - 1)].distance;
+    let shown = |k: usize| (1.0 - (per_bin(k) / extent.radius[wheel] / 3.0).powi(2)).max(0.0);
+    let over = |of: fn(f64) -> f64| -> Vec<f64> {
+        turns.iter().enumerate().map(|(k, turn)| shown(k) * of(*turn)).collect()
+    };
+    vec![over(math::cos), over(math::sin)]
 }
 
 /// Bumps on a grid over all places.
@@ -264,16 +317,18 @@ fn places(path: &Path, extent: &Extent) -> Vec<Vec<f64>> {
         for j in 0..GRID {
             let (x, y) =
                 (x0 + pitch * (bins::to_f64(i) + 0.5), y0 + pitch * (bins::to_f64(j) + 0.5));
-            let bump = |k: usize| {
-                let pose = &path.pose[k];
-                let square = ((pose.x - x).powi(2) + (pose.y - y).powi(2)) / (0.6 * pitch).powi(2);
-                math::exp(-0.5 * square)
-            };
-            let values: Vec<f64> = (0..path.pose.len()).map(bump).collect();
-            shapes.push(values);
+            shapes.push(bump(path, (x, y), pitch));
         }
     }
     shapes
+}
+
+/// How near the path is to a place, on the scale of `pitch` \[m\].
+fn bump(path: &Path, (x, y): (f64, f64), pitch: f64) -> Vec<f64> {
+    let square = |pose: &kerbside_geometry::Pose| {
+        ((pose.x - x).powi(2) + (pose.y - y).powi(2)) / (0.6 * pitch).powi(2)
+    };
+    path.pose.iter().map(|pose| math::exp(-0.5 * square(pose))).collect()
 }
 
 /// What the shapes of an entry along an axis make of all channels, each of one standard deviation.

@@ -21,6 +21,7 @@ mod mistakes;
 mod moved;
 mod noise;
 mod nuisance;
+mod oscillation;
 mod outliers;
 mod patch;
 mod path;

@@ -5,7 +5,7 @@ use kerbside_simulation::Effects;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
-use crate::bins::{CHANNELS, Channels, GYRO, REFERENCE, STEERING};
+use crate::bins::{CHANNELS, Channels, GYRO, REFERENCE, STEERING, to_f64};
 use crate::diagnose::Found;
 use crate::floor::{drawn, in_frame};
 use crate::folds::errors;
@@ -78,7 +78,7 @@ fn map(found: &Found<'_>, run: usize) -> Vec<MapPoint> {
 pub(crate) fn plot(found: &Found<'_>, after: Option<&Effects>) -> Option<RegimePlot> {
     let bench = &found.analysis.bench;
     let shape = found.decision.shape.or_else(|| found.analysis.beside_nothing.first().copied())?;
-    if matches!(shape.axis, Axis::Place | Axis::Heading | Axis::Turn) {
+    if matches!(shape.axis, Axis::Place | Axis::Spot | Axis::Heading | Axis::Turn) {
         return None;
     }
     let channel = match shape.entry {
@@ -90,8 +90,11 @@ pub(crate) fn plot(found: &Found<'_>, after: Option<&Effects>) -> Option<RegimeP
         Entry::Speed => 2,
         Entry::Wheel(wheel) => wheel,
     };
+    let swings = matches!(shape.axis, Axis::Oscillation { .. });
+    // What swings begins anywhere in each run: one of them shows it.
+    let runs = if swings { vec![0] } else { bench.all() };
     let mut points = Vec::new();
-    for run in bench.all() {
+    for run in runs {
         let binned = &bench.ready.runs[run].binned;
         let axis = shapes(shape.axis, shape.entry, &bench.paths[run], &bench.extent, binned.width);
         let before = bench.raw_of(run, &Effects::NEUTRAL);
@@ -107,7 +110,8 @@ pub(crate) fn plot(found: &Found<'_>, after: Option<&Effects>) -> Option<RegimeP
         for (k, along) in axis[0].iter().enumerate().skip(1) {
             let at = value(&before, k);
             if at.is_finite() {
-                points.push((*along, at, with.as_ref().map_or(f64::NAN, |with| value(with, k))));
+                let along = if swings { binned.width * to_f64(k) } else { *along };
+                points.push((along, at, with.as_ref().map_or(f64::NAN, |with| value(with, k))));
             }
         }
     }
@@ -119,7 +123,11 @@ pub(crate) fn plot(found: &Found<'_>, after: Option<&Effects>) -> Option<RegimeP
         _ => "m/s",
     };
     Some(RegimePlot {
-        axis: format!("{}, as a share of its largest", shape.axis.words()),
+        axis: if swings {
+            format!("time in {} [s]", bench.ready.runs[0].run.name)
+        } else {
+            format!("{}, as a share of its largest", shape.axis.words())
+        },
         signal: format!("residual of {} [{unit}]", shape.entry.words()),
         points: points.into_iter().step_by(stride).collect(),
     })

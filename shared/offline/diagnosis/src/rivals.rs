@@ -3,24 +3,29 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use kerbside_geometry::math;
+
 use crate::bench::{Bench, Whole};
-use crate::bins::Channels;
+use crate::bins::{CHANNELS, Channels, to_f64};
 use crate::generic::{Axis, Entry, columns};
 use crate::linear::{Group, Projection, group};
+use crate::oscillation;
 
 /// The shapes of one entry along one axis, whitened.
 #[derive(Clone, Debug)]
 pub(crate) struct Shapes {
     pub entry: Entry,
     pub axis: Axis,
+    /// Logarithm of how many were compared before this one was looked at.
+    pub chosen: f64,
     /// `[shape]` of every run.
     pub columns: Vec<Whole>,
     /// The same, not whitened: `[shape][run]`.
     pub raw: Vec<Vec<Vec<Channels>>>,
 }
 
-/// All groups that the bench's runs can show.
-pub(crate) fn shapes(bench: &Bench<'_>) -> Vec<Shapes> {
+/// All groups that the bench's runs can show; oscillations are those of `residuals`.
+pub(crate) fn shapes(bench: &Bench<'_>, residuals: &[&Whole]) -> Vec<Shapes> {
     // Of motor and rack nothing is known where they are what was measured.
     let shown =
         |entry: &Entry| !(bench.only_follows() && matches!(entry, Entry::Speed | Entry::Rack));
@@ -29,12 +34,69 @@ pub(crate) fn shapes(bench: &Bench<'_>) -> Vec<Shapes> {
         .filter(shown)
         .flat_map(|entry| Axis::ALL.into_iter().map(move |axis| (entry, axis)))
         .filter(|(_, axis)| *axis != Axis::Direction || goes_both_ways(bench))
-        .filter(|(_, axis)| *axis != Axis::Place || !bench.is_cut() || comes_back(bench))
+        .filter(|(entry, axis)| *axis != Axis::Spot || OF_A_SPOT.contains(entry))
+        .filter(|(_, axis)| {
+            !matches!(axis, Axis::Place | Axis::Spot) || !bench.is_cut() || comes_back(bench)
+        })
         .filter(|(entry, axis)| {
             *axis != Axis::Turn || matches!(entry, Entry::Wheel(_) | Entry::Curvature | Entry::Slip)
         })
         .collect();
-    pairs.par_iter().map(|(entry, axis)| of(bench, *entry, *axis)).collect()
+    let mut all: Vec<Shapes> =
+        pairs.par_iter().map(|(entry, axis)| of(bench, *entry, *axis)).collect();
+    let mut swings: Vec<(Axis, f64)> = Vec::new();
+    for residual in residuals {
+        let (axes, of) = oscillation::strongest(bench, residual);
+        for axis in axes {
+            if swings.iter().all(|(other, _)| *other != axis) {
+                swings.push((axis, math::ln(to_f64(of))));
+            }
+        }
+    }
+    let swinging: Vec<(Entry, Axis, f64)> = THAT_SWING
+        .into_iter()
+        .filter(shown)
+        .flat_map(|entry| swings.iter().map(move |(axis, chosen)| (entry, *axis, *chosen)))
+        .collect();
+    all.par_extend(swinging.par_iter().map(|(entry, axis, chosen)| Shapes {
+        chosen: *chosen,
+        ..run_by_run(bench, of(bench, *entry, *axis))
+    }));
+    all
+}
+
+/// Where something may act on small spots.
+const OF_A_SPOT: [Entry; 5] =
+    [Entry::Slip, Entry::Curvature, Entry::Side, Entry::Position, Entry::Yaw];
+/// What may swing by itself.
+const THAT_SWING: [Entry; 7] = [
+    Entry::Speed,
+    Entry::Rack,
+    Entry::Slip,
+    Entry::Curvature,
+    Entry::Side,
+    Entry::SteeringSensor,
+    Entry::Gyro,
+];
+
+/// The same with shapes of its own for each run.
+fn run_by_run(bench: &Bench<'_>, shapes: Shapes) -> Shapes {
+    let runs = bench.all();
+    let mut raw = Vec::new();
+    let mut columns: Vec<Whole> = Vec::new();
+    for (shape, whitened) in shapes.raw.iter().zip(&shapes.columns) {
+        for run in &runs {
+            let still = |other: usize| vec![[0.0; CHANNELS]; shape[other].len()];
+            let own =
+                |other: &usize| if other == run { shape[*run].clone() } else { still(*other) };
+            raw.push(runs.iter().map(own).collect());
+            let nothing = |other: usize| DVector::zeros(whitened[other].len());
+            let own =
+                |other: &usize| if other == run { whitened[*run].clone() } else { nothing(*other) };
+            columns.push(runs.iter().map(own).collect());
+        }
+    }
+    Shapes { raw, columns, ..shapes }
 }
 
 /// Whether the car went forwards and in reverse, each farther than it is long: else what depends on the direction is the
@@ -86,7 +148,7 @@ fn of(bench: &Bench<'_>, entry: Entry, axis: Axis) -> Shapes {
             runs.iter().enumerate().map(|(run, column)| bench.whitened(run, column)).collect()
         })
         .collect();
-    Shapes { entry, axis, columns, raw }
+    Shapes { entry, axis, chosen: 0.0, columns, raw }
 }
 
 /// How much likelier a group makes what is left of a set of effects, whose sizes (`slopes`) may move along.
@@ -101,7 +163,8 @@ pub(crate) fn judge(
     vectors.extend(shapes.columns.iter().map(Vec::as_slice));
     vectors.push(residual);
     let products = projection.products(&bench.designs, &vectors);
-    group(&condition(products, slopes.len()))
+    let found = group(&condition(products, slopes.len()))?;
+    Some(Group { log_evidence: found.log_evidence - shapes.chosen, ..found })
 }
 
 /// Integrates the first `count` vectors out of a matrix of products, each with a unit prior.

@@ -5,6 +5,7 @@ use crate::decide::Decision;
 use crate::diagnose::Found;
 use crate::generic::Axis;
 use crate::nuisance::is_partly_stated;
+use crate::oscillation;
 use crate::verdict::{Diagnosis, FoundEffect, Verdict};
 
 /// One sentence for a tired engineer.
@@ -34,11 +35,13 @@ pub(crate) fn sentence(diagnosis: &Diagnosis, decision: &Decision) -> String {
         ),
         Verdict::Unknown => {
             let shape = decision.shape.map_or(String::new(), |shape| {
-                format!(
-                    ": {} depends on {} in a way that no listed effect has",
-                    shape.entry.words(),
-                    shape.axis.words()
-                )
+                let entry = shape.entry.words();
+                if let Axis::Oscillation { millihertz } = shape.axis {
+                    let often = oscillation::words(millihertz);
+                    return format!(": {entry} swings at {often}, as no listed effect does");
+                }
+                let on = shape.axis.words();
+                format!(": {entry} depends on {on} in a way that no listed effect has")
             });
             format!("A real gap of unknown cause{shape} ({}).", percent(decision.unknown))
         }
@@ -100,8 +103,11 @@ pub(crate) fn regime(found: &Found<'_>, verdict: Verdict) -> String {
         Axis::Curvature => "changes with the curvature of the path",
         Axis::SteeringRate => "depends on which way the steering turns",
         Axis::Heading => "depends on the heading",
-        Axis::Place => "depends on the place",
+        Axis::Place | Axis::Spot => "depends on the place",
         Axis::Turn => "varies once a turn of the wheel",
+        Axis::Oscillation { millihertz } => {
+            return format!("{} swings at {}", shape.entry.words(), oscillation::words(millihertz));
+        }
     };
     format!("{} {when}", shape.entry.words())
 }

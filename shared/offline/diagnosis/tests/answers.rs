@@ -10,7 +10,7 @@ use kerbside_diagnosis::{Case, DiagnosisError, Settings, Verdict, Wheels, diagno
 use kerbside_geometry::Pose;
 use kerbside_simulation::effects::Link;
 use kerbside_simulation::{Effects, Parameter};
-use support::{ALL, Sensors, answer, case, case_marked, with};
+use support::{ALL, Sensors, answer, case, case_limited, case_marked, case_swinging, with};
 
 fn finds(id: &str, name: &str, value: f64, link: Link, tolerance: f64) {
     let found = answer(&case(&with(id, name, value), ALL, 1));
@@ -105,6 +105,15 @@ fn a_car_in_good_order_has_nothing() {
     assert!(above.is_empty(), "{above:?}");
 }
 
+/// At the limit a motor that is a little too strong makes no difference, one that is too weak does.
+#[test]
+fn a_car_in_good_order_that_is_driven_at_its_limit_has_nothing() {
+    for seed in 20..23 {
+        let found = answer(&case_limited(&with("speed_gain", "gain", 0.996), 0.25, seed));
+        assert_eq!(found.verdict, Verdict::None, "{}", found.sentence);
+    }
+}
+
 /// A marker far in front of the rear axle does not set out where the car heads.
 #[test]
 fn a_marker_in_front_whose_yaw_nobody_tells_is_no_gap() {
@@ -132,6 +141,33 @@ fn what_depends_on_the_direction_of_travel_is_unknown() {
         "{}",
         found.sentence
     );
+}
+
+#[test]
+fn what_swings_by_itself_is_unknown_and_said_with_its_frequency() {
+    let found = answer(&case_swinging(0.03, 0.83, 7));
+    assert_eq!(found.verdict, Verdict::Unknown, "{}", found.sentence);
+    assert_eq!(found.links_named, [Link::SteeringActuation], "{}", found.sentence);
+    assert!(found.sentence.contains("swings at 0.8"), "{}", found.sentence);
+    // Faster than the bins tell apart.
+    let found = answer(&case_swinging(0.05, 2.3, 8));
+    assert_eq!(found.verdict, Verdict::Unknown, "{}", found.sentence);
+    assert!(found.sentence.contains("or 2.3"), "{}", found.sentence);
+}
+
+#[test]
+fn a_reference_that_is_pulled_to_a_spot_is_unknown() {
+    let mut pulled = case(&Effects::NEUTRAL, ALL, 9);
+    let (spot, radius, pull) = ((0.9, 0.1), 0.45, 0.05);
+    for row in pulled.runs.iter_mut().flat_map(|run| &mut run.reference.value) {
+        let (x, y) = (spot.0 - row[0], spot.1 - row[1]);
+        let away = x.hypot(y) / radius;
+        let share = pull * away * (1.0 - away).max(0.0) * 4.0 / (away * radius).max(1e-9);
+        (row[0], row[1]) = (row[0] + share * x, row[1] + share * y);
+    }
+    let found = answer(&pulled);
+    assert_eq!(found.verdict, Verdict::Unknown, "{}", found.sentence);
+    assert_eq!(found.links_named, [Link::Reference], "{}", found.sentence);
 }
 
 #[test]

@@ -85,6 +85,14 @@ impl Whitener {
         }
     }
 
+    /// Bin and channel of each whitened value, in their order.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (usize, usize)> {
+        let of_bin = |(bin, updates): (usize, &Vec<Update>)| {
+            updates.iter().map(move |update| (bin, update.channel)).collect::<Vec<_>>()
+        };
+        self.updates.iter().enumerate().flat_map(of_bin)
+    }
+
     /// Appends the whitened residuals to `out`. A value that is missing where one was measured counts as no residual.
     pub(crate) fn apply(&self, residuals: &[Channels], out: &mut Whitened) {
         let mut x: State = [0.0; STATES];

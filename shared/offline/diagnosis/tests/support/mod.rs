@@ -104,6 +104,32 @@ pub(crate) fn case(effects: &Effects, sensors: Sensors, seed: u64) -> Case {
     Case { name: "case".to_owned(), vehicle, allowance: Some(allowance()), runs }
 }
 
+/// The six drives of a car whose motor is asked for more than its limit \[m/s\] in some.
+pub(crate) fn case_limited(effects: &Effects, limit: f64, seed: u64) -> Case {
+    let mut vehicle = vehicle();
+    vehicle.limits.speed = limit;
+    let runs = (0..6)
+        .map(|drive| run(&vehicle, effects, ALL, seed, (drive, 12.0), |t| asked(drive, t)))
+        .collect();
+    Case { name: "limited".to_owned(), vehicle, allowance: Some(allowance()), runs }
+}
+
+/// The six drives with a rack that swings by `amplitude` \[rad\], `often` \[Hz\], and nobody commands it.
+pub(crate) fn case_swinging(amplitude: f64, often: f64, seed: u64) -> Case {
+    let vehicle = vehicle();
+    let swinging = |drive: usize| {
+        let told = |t: f64| {
+            let (speed, steering) = asked(drive, t);
+            (speed, steering + amplitude * math::sin(TAU * (often * t + 0.37 * drive as f64)))
+        };
+        let mut run = run(&vehicle, &Effects::NEUTRAL, ALL, seed, (drive, 12.0), told);
+        run.commands.iter_mut().for_each(|command| command.steering = asked(drive, command.t).1);
+        run
+    };
+    let runs = (0..6).map(swinging).collect();
+    Case { name: "swinging".to_owned(), vehicle, allowance: Some(allowance()), runs }
+}
+
 /// The six drives with a reference that shows the position of `marker` alone.
 pub(crate) fn case_marked(effects: &Effects, marker: Pose, seed: u64) -> Case {
     let mut vehicle = vehicle();
