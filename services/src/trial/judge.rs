@@ -22,8 +22,10 @@ pub struct Row {
     pub verdict: Option<String>,
     /// Effects that were named.
     pub named: Vec<String>,
-    /// Exactly right.
+    /// Exactly right: what was put in is named; where the runs cannot tell it from others, all of them.
     pub exact: bool,
+    /// What is named is what was put in.
+    pub right: bool,
     /// Exactly right, or among at most three alternatives.
     pub set: bool,
     /// Right links.
@@ -68,9 +70,15 @@ pub fn judge(case: &str, label: &Label, answer: Option<&Answer>) -> Row {
         _ => {
             let sets = &answer.alternatives;
             let holds = sets.iter().any(|set| set.0 == truth);
-            row.exact = answer.verdict == "effects" && row.named == truth;
-            row.set = row.exact || answer.verdict == "ambiguous" && sets.len() <= LARGEST && holds;
-            row.in_set = holds || sets.is_empty() && row.exact;
+            row.right = answer.verdict == "effects" && row.named == truth;
+            let few = answer.verdict == "ambiguous" && sets.len() <= LARGEST && holds;
+            let named = |twin: &Vec<String>| sets.iter().any(|set| set.0 == *twin);
+            row.exact = match label.twins.as_slice() {
+                [] => row.right,
+                twins => few && twins.iter().take(LARGEST - 1).all(named),
+            };
+            row.set = row.exact || row.right || few;
+            row.in_set = holds || sets.is_empty() && row.right;
             row.set_size = sets.len().max(usize::from(!row.named.is_empty()));
             row.on_truth = answer.probability_of(&label.ids());
             for effect in &label.effects {

@@ -7,6 +7,8 @@ use std::fmt::Write;
 use kerbside_proving_ground::cases::{Case, Kind};
 use toml_edit::{DocumentMut, Item, Table};
 
+use super::twins::{TWIN, Twin};
+
 /// What was put in, as it is scored.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Label {
@@ -16,8 +18,12 @@ pub struct Label {
     pub links: Vec<String>,
     /// Listed effects.
     pub effects: Vec<Truth>,
+    /// Names of all that was put in, listed or not.
+    pub put_in: Vec<String>,
     /// Size d of the weakest effect; none where there is none.
     pub size: Option<f64>,
+    /// Sets of effects that the runs cannot tell from what was put in, the closest first.
+    pub twins: Vec<Vec<String>>,
     /// What the vehicle has: a word of letters, see [`sensors`].
     pub sensors: String,
 }
@@ -35,13 +41,16 @@ pub struct Truth {
     pub spread: BTreeMap<String, f64>,
 }
 
-/// The text of the label, with `sizes` of its effects.
+/// The text of the label, with `sizes` of its effects and what comes close to them.
 #[must_use]
-pub fn text(case: &Case, sizes: &[f64]) -> String {
+pub fn text(case: &Case, sizes: &[f64], twins: &[Twin]) -> String {
     let mut text = case.label().text();
     // Writing to a string never fails.
     for (effect, size) in case.specification.effects.iter().zip(sizes) {
         let _ = write!(text, "\n[[size]]\nid = \"{}\"\nd = {size:.3}\n", effect.id);
+    }
+    for Twin { of, id, apart } in twins {
+        let _ = write!(text, "\n[[twin]]\nof = \"{of}\"\nid = \"{id}\"\nd = {apart:.3}\n");
     }
     let _ = write!(
         text,
@@ -98,11 +107,14 @@ impl Label {
             }
         }
         let sizes = blocks("size");
+        let put_in = sizes.iter().map(|block| word(block.get("id"))).collect();
         let sizes = sizes.iter().filter_map(|block| block.get("d").and_then(number));
         let size = sizes.reduce(f64::min);
+        let ids: Vec<&str> = effects.iter().map(|effect| effect.id.as_str()).collect();
+        let twins = indistinct(&ids, &blocks("twin"));
         let case = document.get("case").and_then(Item::as_table);
         let sensors = word(case.and_then(|case| case.get("sensors")));
-        Ok(Self { kind, links, effects, size, sensors })
+        Ok(Self { kind, links, effects, put_in, size, twins, sensors })
     }
 
     /// Names of the effects, sorted.
@@ -118,6 +130,22 @@ impl Label {
     pub fn has_steering_sensor(&self) -> bool {
         self.sensors.contains('s')
     }
+}
+
+/// The sets of effects that no run tells from `ids`.
+fn indistinct(ids: &[&str], blocks: &[&Table]) -> Vec<Vec<String>> {
+    let word = |block: &Table, key: &str| block.get(key).and_then(Item::as_str).map(str::to_owned);
+    let twin = |block: &&Table| {
+        let (of, id) = (word(block, "of")?, word(block, "id")?);
+        let apart = block.get("d").and_then(number).filter(|apart| *apart < TWIN)?;
+        let mut set: Vec<String> = ids.iter().map(|own| (*own).to_owned()).collect();
+        set.iter_mut().filter(|own| **own == of).for_each(|own| own.clone_from(&id));
+        set.sort_unstable();
+        Some((apart, set))
+    };
+    let mut twins: Vec<(f64, Vec<String>)> = blocks.iter().filter_map(twin).collect();
+    twins.sort_by(|a, b| a.0.total_cmp(&b.0));
+    twins.into_iter().map(|(_, set)| set).collect()
 }
 
 impl Truth {
@@ -149,8 +177,10 @@ mod tests {
         {
             let case = Case::draw(seed, kind);
             let sizes: Vec<f64> = case.specification.effects.iter().map(|_| 12.5).collect();
-            let label = Label::parse(&text(&case, &sizes)).unwrap();
+            let label = Label::parse(&text(&case, &sizes, &[])).unwrap();
             assert_eq!(label.kind, kind.name());
+            let put_in = case.specification.effects.iter().map(|effect| effect.id);
+            assert!(label.put_in.iter().map(String::as_str).eq(put_in));
             assert_eq!(label.links.len(), case.label().links.len());
             assert_eq!(label.sensors, sensors(&case));
             assert_eq!(label.size, (kind != Kind::Null).then_some(12.5));
@@ -162,5 +192,25 @@ mod tests {
             }
         }
         assert!(Label::parse("kind = \"other\"").is_err());
+    }
+
+    #[test]
+    fn a_twin_is_what_comes_close_enough_in_place_of_what_was_put_in() {
+        let request = kerbside_proving_ground::cases::Request {
+            ids: vec!["understeer", "gyro_bias"],
+            ..kerbside_proving_ground::cases::Request::new(Kind::Pair)
+        };
+        let case = (0..200).find_map(|seed| Case::of(seed, &request)).unwrap();
+        let twin = |id: &'static str, apart: f64| Twin { of: "understeer", id, apart };
+        let twins = [
+            twin("wheelbase_scale", 2.5),
+            twin("steering_lag", 3.5),
+            twin("steering_compliance", 1.0),
+        ];
+        let label = Label::parse(&text(&case, &[12.0, 30.0], &twins)).unwrap();
+        assert_eq!(
+            label.twins,
+            [["gyro_bias", "steering_compliance"], ["gyro_bias", "wheelbase_scale"]]
+        );
     }
 }

@@ -20,6 +20,7 @@ mod sitting;
 mod size;
 #[cfg(test)]
 mod tests;
+mod twins;
 
 use std::fs;
 use std::io::IsTerminal;
@@ -29,6 +30,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use kerbside_proving_ground::cases::{Case, Drives, Kind, Request, SecondVehicle, series};
+use kerbside_proving_ground::insertions::UNLISTED;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde_json::{Value, json};
@@ -44,6 +46,9 @@ use judge::Row;
 use label::Label;
 use score::{Score, Share};
 use seal::Sealed;
+
+/// Vehicles that are tried until one shows a cause.
+const VEHICLES: usize = 200;
 
 /// Who drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -86,6 +91,9 @@ pub struct TrialArgs {
     /// Cases in good order besides.
     #[arg(long, default_value_t = 0)]
     pub nulls: u32,
+    /// Cases besides whose cause is not listed; every such cause in turn.
+    #[arg(long, default_value_t = 0)]
+    pub unlisted: u32,
     /// Seed of everything but the salts.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -185,6 +193,7 @@ fn same_trial(out: &Path, args: &TrialArgs, hash: &str) -> Result<(), Failure> {
     let path = out.join("trial.json");
     let now = json!({
         "schema": "kerbside.trial.begun.v1", "version": env!("CARGO_PKG_VERSION"), "cases": args.cases, "nulls": args.nulls,
+        "unlisted": args.unlisted,
         "seed": args.seed, "plant": args.plant.name(), "duration": args.duration, "program": hash,
     });
     let Ok(text) = fs::read_to_string(&path) else {
@@ -197,7 +206,7 @@ fn same_trial(out: &Path, args: &TrialArgs, hash: &str) -> Result<(), Failure> {
     Err(Failure::with_help(
         Exit::Usage,
         format!("{} holds another trial: {known}", out.display()),
-        "take another --out, or the same --cases, --nulls, --seed, --plant, --duration and executable",
+        "take another --out, or the same --cases, --nulls, --unlisted, --seed, --plant, --duration and executable",
     ))
 }
 
@@ -209,6 +218,15 @@ fn draw(args: &TrialArgs) -> Vec<Drawn> {
     for _ in 0..args.nulls {
         let at = chance.random_range(0..=wanted.len());
         wanted.insert(at, (chance.random_range(0..1 << 53), change(Request::new(Kind::Null))));
+    }
+    for number in 0..args.unlisted as usize {
+        let cause = UNLISTED[number % UNLISTED.len()].id;
+        let request = Request { ids: vec![cause], ..change(Request::new(Kind::Unknown)) };
+        let mut seeds = (0..VEHICLES).map(|_| chance.random_range(0..1 << 53));
+        if let Some(seed) = seeds.find(|seed| Case::of(*seed, &request).is_some()) {
+            let at = chance.random_range(0..=wanted.len());
+            wanted.insert(at, (seed, request));
+        }
     }
     let known = |request: &Request| args.plant.knows_unlisted() || request.kind != Kind::Unknown;
     let cases = wanted.iter().filter(|(_, request)| known(request));
@@ -231,8 +249,9 @@ fn seal_all(
     let bar = bar(drawn.len(), "{bar:30} {pos}/{len} sealed, {elapsed}");
     let done = sitting::each(drawn, late, &|one| {
         if Sealed::kept(&folder, &one.name).is_none() {
-            let sizes = size::sizes(&one.case, args.plant.driver());
-            Sealed::new(&one.name, args.seed, label::text(&one.case, &sizes))?.keep(&folder)?;
+            let (sizes, twins) = twins::measured(&one.case, args.plant.driver());
+            Sealed::new(&one.name, args.seed, label::text(&one.case, &sizes, &twins))?
+                .keep(&folder)?;
         }
         bar.inc(1);
         Ok(())
@@ -351,7 +370,7 @@ fn drive_again(
         }
         let document = sitting::kept(&place).and_then(Result::ok).unwrap_or_default();
         let answer = Answer::read(&document, &one.name).ok();
-        let right = judge::judge(&one.name, &row.label, answer.as_ref()).exact;
+        let right = judge::judge(&one.name, &row.label, answer.as_ref()).right;
         let mut share = share.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         *share = Share { right: share.right + usize::from(right), of: share.of + 1 };
         Ok(())

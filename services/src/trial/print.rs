@@ -38,6 +38,8 @@ pub fn tell(score: &Score, facts: &Facts<'_>) {
     println!("{}", classes("single effects, by size d", &score.by(&["single"], size_class)));
     println!("{}", classes("pairs, by size d of the weaker", &score.by(&["pair"], size_class)));
     println!("{}", classes("single effects", &score.by(&["single"], effect)));
+    println!("{}", classes("causes not listed", &score.by(&["unknown"], cause)));
+    println!("{}", classes("causes not listed, by size d", &score.by(&["unknown"], size_class)));
     println!("{}", classes("single effects, by sensors", &score.by(&["single"], sensors)));
     println!("{}", calibration(score));
     println!("{}", against(score));
@@ -77,11 +79,13 @@ fn kinds(score: &Score) -> Table {
         [&["single"], &["pair"], &["null"], &["unknown"]];
     for (name, share) in [
         ("single: effect", share(single, |row| row.exact)),
+        ("single: effect, named alone", share(single, |row| row.right)),
         ("single: effect, or among three", share(single, |row| row.set)),
         ("single: link", share(single, |row| row.link)),
         ("single: link among those that moved", share(single, |row| row.moved)),
         ("null: no link moved", share(null, |row| row.moved)),
         ("pair: both", share(pair, |row| row.exact)),
+        ("pair: both, named alone", share(pair, |row| row.right)),
         ("pair: both, or among three", share(pair, |row| row.set)),
         ("null: false alarms", score.false_alarms()),
         ("unknown: flagged", score.unknown_flagged()),
@@ -160,6 +164,10 @@ fn effect(row: &Row) -> String {
     row.label.ids().join(" + ")
 }
 
+fn cause(row: &Row) -> String {
+    row.label.put_in.join(" + ")
+}
+
 /// What the vehicle has, in words.
 fn sensors(row: &Row) -> String {
     let has = |letter: char| row.label.sensors.contains(letter);
@@ -195,8 +203,8 @@ fn document(score: &Score, facts: &Facts<'_>, passed: bool) -> Value {
     let alarms = score.false_alarms();
     let case = |row: &Row| {
         json!({
-            "case": row.case, "kind": row.label.kind, "truth": row.label.ids(), "size": row.label.size,
-            "verdict": row.verdict, "answer": row.named, "exact": row.exact, "set": row.set,
+            "case": row.case, "kind": row.label.kind, "truth": row.label.ids(), "put_in": row.label.put_in, "size": row.label.size,
+            "verdict": row.verdict, "answer": row.named, "exact": row.exact, "right": row.right, "twins": row.label.twins, "set": row.set,
             "link": row.link, "moved": row.moved, "probability": row.stated, "on_truth": row.on_truth,
             "removed": row.removed, "seconds": row.seconds,
         })
@@ -213,6 +221,8 @@ fn document(score: &Score, facts: &Facts<'_>, passed: bool) -> Value {
         "program": facts.program,
         "link": of(&["single"], |row| row.link),
         "effect": of(&["single"], |row| row.exact),
+        "effect_alone": of(&["single"], |row| row.right),
+        "pair_alone": of(&["pair"], |row| row.right),
         "effect_or_set": of(&["single"], |row| row.set),
         "link_moved": of(&["single"], |row| row.moved),
         "null_unmoved": of(&["null"], |row| row.moved),
@@ -232,6 +242,8 @@ fn document(score: &Score, facts: &Facts<'_>, passed: bool) -> Value {
         "by_effect": by(score.by(&["single"], effect)),
         "by_size": by(score.by(&["single"], size_class)),
         "by_size_pairs": by(score.by(&["pair"], size_class)),
+        "by_cause": by(score.by(&["unknown"], cause)),
+        "by_size_unknown": by(score.by(&["unknown"], size_class)),
         "by_sensors": by(score.by(&["single"], sensors)),
         "seconds_per_case": score.seconds(),
         "rows": score.rows.iter().map(case).collect::<Vec<_>>(),

@@ -125,7 +125,7 @@ impl Score {
     #[must_use]
     pub fn reliability(&self) -> Vec<Bin> {
         let stated: Vec<(f64, bool)> =
-            self.rows.iter().filter_map(|row| Some((row.stated?, row.exact))).collect();
+            self.rows.iter().filter_map(|row| Some((row.stated?, row.right))).collect();
         let bin = |ends: &[f64]| {
             let within: Vec<_> =
                 stated.iter().filter(|(p, _)| (ends[0]..ends[1]).contains(p)).collect();
@@ -150,7 +150,7 @@ impl Score {
     /// Median error of parameters at large effects.
     #[must_use]
     pub fn parameter_error(&self) -> f64 {
-        let rows = self.large(&["single", "pair"]).filter(|row| row.exact);
+        let rows = self.large(&["single", "pair"]).filter(|row| row.right || row.exact);
         median(rows.flat_map(|row| row.errors.iter().map(|error| error.1)))
     }
 
@@ -312,7 +312,7 @@ mod tests {
 
     #[test]
     fn calibration_error_is_the_mean_distance_of_the_classes() {
-        let row = |stated: f64, exact: bool| Row { stated: Some(stated), exact, ..Row::default() };
+        let row = |stated: f64, right: bool| Row { stated: Some(stated), right, ..Row::default() };
         let rows = vec![row(0.95, true), row(0.97, false), row(0.6, true), row(0.65, true)];
         let score = Score { rows };
         let expected = 0.5 * (0.96 - 0.5) + 0.5 * (1.0 - 0.625);

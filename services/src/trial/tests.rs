@@ -9,6 +9,7 @@ fn args(out: &Path, cases: u32) -> TrialArgs {
     TrialArgs {
         cases,
         nulls: 1,
+        unlisted: 0,
         seed: 5,
         plant: Plant::Simulator,
         duration: 5.0,
@@ -41,12 +42,27 @@ fn the_same_seed_draws_the_same_cases_and_another_others() {
     let folder = tempfile::tempdir().unwrap();
     let args = args(folder.path(), 6);
     let labels = |args: &TrialArgs| -> Vec<String> {
-        draw(args).iter().map(|one| label::text(&one.case, &[])).collect()
+        draw(args).iter().map(|one| label::text(&one.case, &[], &[])).collect()
     };
     assert_eq!(labels(&args), labels(&args));
     assert_ne!(labels(&args), labels(&TrialArgs { seed: 6, ..args.clone() }));
     let nulls = draw(&args).iter().filter(|one| one.case.specification.kind == Kind::Null).count();
     assert!(nulls >= 1, "one was asked for");
+}
+
+#[test]
+fn causes_that_are_not_listed_come_in_turn_where_the_plant_knows_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let unlisted =
+        TrialArgs { unlisted: 3, nulls: 0, plant: Plant::ProvingGround, ..args(folder.path(), 1) };
+    let drawn = draw(&unlisted);
+    let cause = |known: &kerbside_proving_ground::insertions::Definition| {
+        let of = |one: &&Drawn| one.case.specification.effects.iter().any(|e| e.id == known.id);
+        drawn.iter().filter(of).count()
+    };
+    assert!(UNLISTED[..3].iter().all(|known| cause(known) >= 1));
+    let plant = Plant::Simulator;
+    assert!(draw(&TrialArgs { plant, ..unlisted }).len() <= 1, "that plant cannot drive them");
 }
 
 #[test]

@@ -33,6 +33,7 @@ use crate::insertions::{Effect, definition, merged};
 pub use crate::car::SecondVehicle;
 pub use floor::{Disturbance, Floor};
 pub use label::Label;
+pub use put_in::TWINS;
 pub use record::{Drives, Errors, Rows, Signals, Task};
 pub use series::series;
 pub use specification::{Build, Kind, Plan, Specification, Stamps, Uncertainty};

@@ -22,8 +22,8 @@ const OF_THE_BODY: [&str; 7] = [
     "radius_growth",
     "reference_delay",
 ];
-/// Two of one group are not put in together: each does about what the other does.
-const TWINS: [&[&str]; 6] = [
+/// Each of a group does about what the others do: two of one are not put in together.
+pub const TWINS: [&[&str]; 6] = [
     &["understeer", "steering_compliance"],
     &["speed_gain", "speed_dead_zone"],
     &["speed_delay", "encoder_delay", "speed_lag"],
