@@ -64,6 +64,9 @@ pub struct Flight {
     pub rolled: f64,
     /// Until when it moved \[ns\].
     pub moved: Nanos,
+    /// The simulated vehicle's own time of the blow, and until when it moved \[ns\]: where the machine starves it, it stands
+    /// still in the middle of its motion.
+    own: (Nanos, Nanos),
     /// Whether a stalled process was let go on.
     pub resumed: bool,
     /// When its process died, by us or by its supervisor \[ns\].
@@ -103,6 +106,7 @@ impl Flight {
         truth: &Truth,
     ) -> Self {
         let moving = truth.speed.abs() >= REST;
+        let own = truth.vehicle_time + at.saturating_sub(truth.header.stamp);
         Self {
             process,
             blow,
@@ -112,6 +116,7 @@ impl Flight {
             fastest: truth.speed.abs(),
             rolled: 0.0,
             moved: at,
+            own: (own, own),
             resumed: false,
             died: (blow == Blow::Kill).then_some(at),
             back: None,
@@ -142,6 +147,7 @@ impl Flight {
         self.rolled = truth.distance - self.distance;
         if speed >= REST {
             self.moved = truth.header.stamp;
+            self.own.1 = truth.vehicle_time.max(self.own.0);
         }
     }
 
@@ -169,7 +175,7 @@ impl Flight {
         let must_stop = self.blow.must_stop(self.process) && self.moving;
         let judged = must_stop || self.left;
         self.stopped |= stood && self.left;
-        let taken = seconds(self.moved - self.at);
+        let taken = self.stop_time();
         if must_stop && (self.rolled > distance || taken > time) {
             return Course::NotStopped;
         }
@@ -192,9 +198,36 @@ impl Flight {
         Some(seconds(self.back?.saturating_sub(self.died?)))
     }
 
-    /// Time until the vehicle stood \[s\].
+    /// Time until the vehicle stood, by the host's clock or by its own, where the machine let it live for less \[s\].
     #[must_use]
     pub fn stop_time(&self) -> f64 {
-        seconds(self.moved - self.at)
+        seconds((self.moved - self.at).min(self.own.1 - self.own.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kerbside_messages::Header;
+
+    #[test]
+    fn a_vehicle_that_the_machine_starves_is_timed_by_its_own_clock() {
+        let ms = 1_000_000;
+        let truth = |stamp: Nanos, own: Nanos, speed: f64| Truth {
+            header: Header::stamped(stamp * ms, 0),
+            vehicle_time: own * ms,
+            speed,
+            ..Truth::default()
+        };
+        let stall = Blow::Stall(1_500 * ms);
+        let begun = truth(1_000, 400, 0.2);
+        let mut flight =
+            Flight::new(Process::Actuation, stall, 1, 1_010 * ms, &State::default(), &begun);
+        flight.truth(&truth(1_500, 900, 0.1), 0);
+        assert!((flight.stop_time() - 0.49).abs() < 1e-9);
+        // Nothing for most of a second, and it goes on where it was.
+        flight.truth(&truth(2_400, 920, 0.09), 0);
+        flight.truth(&truth(2_900, 1_420, 0.0), 0);
+        assert!((flight.stop_time() - 0.51).abs() < 1e-9, "{}", flight.stop_time());
     }
 }

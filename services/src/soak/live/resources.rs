@@ -14,6 +14,8 @@ const WARM_UP: f64 = 1.5;
 const BLOCK: f64 = 10.0;
 /// Fewer blocks tell no slope.
 const BLOCKS: usize = 9;
+/// More lives tell by themselves how surely.
+const LIVES: usize = 4;
 /// What the index of an open recording takes \[KiB a minute\]: an entry for each chunk and topic, written at its end, which
 /// `recorder.file_bytes` bounds.
 const INDEX: f64 = 100.0;
@@ -138,32 +140,55 @@ impl Resources {
 }
 
 /// The common slope of the later halves of all lives, each with a level of its own (ordinary least squares on means of
-/// blocks): a leak goes on where an allocator that finds its size comes to rest.
+/// blocks): a leak goes on where an allocator that finds its size comes to rest. Where there are several lives its interval
+/// is by what differs from life to life, since memory comes in steps and the blocks of one life are no independent
+/// witnesses (Liang and Zeger 1986).
 #[must_use]
 pub fn slope(samples: &[Sample]) -> Option<Slope> {
-    let lives = blocks(samples);
-    let (mut xx, mut xy, mut yy, mut count, mut levels) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for life in lives.iter().filter(|life| life.len() > 1) {
-        #[allow(clippy::cast_precision_loss)] // blocks of a life
-        let size = life.len() as f64;
-        let mean = |of: fn(&(f64, f64)) -> f64| life.iter().map(of).sum::<f64>() / size;
-        let (x, y) = (mean(|point| point.0), mean(|point| point.1));
-        for point in life {
-            xx += (point.0 - x) * (point.0 - x);
-            xy += (point.0 - x) * (point.1 - y);
-            yy += (point.1 - y) * (point.1 - y);
-        }
-        count += size;
-        levels += 1.0;
-    }
-    #[allow(clippy::cast_precision_loss)] // blocks
-    if count < BLOCKS as f64 || xx <= 0.0 {
+    let lives: Vec<Centred> = blocks(samples).iter().filter_map(|life| Centred::of(life)).collect();
+    let sum = |of: fn(&Centred) -> f64| lives.iter().map(of).sum::<f64>();
+    let (xx, xy, count) = (sum(|life| life.xx), sum(|life| life.xy), sum(|life| life.count));
+    #[allow(clippy::cast_precision_loss)] // a few
+    let (levels, least) = (lives.len() as f64, BLOCKS as f64);
+    if count < least || xx <= 0.0 {
         return None;
     }
     let value = xy / xx;
-    let freedom = (count - levels - 1.0).max(1.0);
-    let spread = 1.96 * ((yy - value * xy).max(0.0) / freedom / xx).sqrt();
+    let variance = if lives.len() > LIVES {
+        let apart = lives.iter().map(|life| (life.xy - value * life.xx).powi(2)).sum::<f64>();
+        levels / (levels - 1.0) * apart / (xx * xx)
+    } else {
+        (sum(|life| life.yy) - value * xy).max(0.0) / (count - levels - 1.0).max(1.0) / xx
+    };
+    let spread = 1.96 * variance.sqrt();
     Some(Slope { value, low: value - spread, high: value + spread })
+}
+
+/// Sums of a life's blocks about their mean: times, times by values, values.
+struct Centred {
+    xx: f64,
+    xy: f64,
+    yy: f64,
+    count: f64,
+}
+
+impl Centred {
+    /// None of a single block.
+    fn of(life: &[(f64, f64)]) -> Option<Self> {
+        #[allow(clippy::cast_precision_loss)] // blocks of a life
+        let count = life.len() as f64;
+        let mean = |of: fn(&(f64, f64)) -> f64| life.iter().map(of).sum::<f64>() / count;
+        let (x, y) = (mean(|point| point.0), mean(|point| point.1));
+        let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+            life.iter().map(|point| of(point.0 - x, point.1 - y)).sum()
+        };
+        (life.len() > 1).then(|| Self {
+            xx: sum(&|x, _| x * x),
+            xy: sum(&|x, y| x * y),
+            yy: sum(&|_, y| y * y),
+            count,
+        })
+    }
 }
 
 /// Means of blocks as (minute, value), by life.
@@ -265,6 +290,18 @@ mod tests {
             samples(2, |pid, at| 8_000.0 + settles(at - 200.0 * f64::from(pid)) + wobble(at));
         let slope = slope(&samples).unwrap();
         assert!(!slope.leaks("tracker", Resource::Memory), "{slope:?}");
+    }
+
+    #[test]
+    fn a_step_in_some_lives_is_no_leak_and_what_grows_in_all_is_one() {
+        let own = |pid: u32, at: f64| at - 200.0 * f64::from(pid);
+        let steps = samples(8, |pid, at| {
+            let late = pid < 2 && own(pid, at) > 145.0;
+            3_300.0 + if late { 32.0 } else { 0.0 } + 0.1 * wobble(at)
+        });
+        assert!(!slope(&steps).unwrap().leaks("supervisor", Resource::Memory));
+        let grows = samples(8, |pid, at| 3_300.0 + 8.0 * own(pid, at) / 60.0 + wobble(at));
+        assert!(slope(&grows).unwrap().leaks("supervisor", Resource::Memory));
     }
 
     #[test]
