@@ -212,7 +212,10 @@ impl<'a> Acting<'a> {
                 }
             },
             Action::Terminate(process) => self.children.terminate(*process),
-            Action::Kill(process) => self.children.kill(*process),
+            Action::Kill(process) => {
+                tracing::warn!(%process, "killed: it no longer answers");
+                self.children.kill(*process);
+            }
             Action::CleanUp => self.sweeper.sweep(),
             Action::PublishRestore => {
                 if let Some(odometry) = self.supervisor.restore() {

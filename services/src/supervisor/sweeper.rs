@@ -12,6 +12,8 @@ use crate::exit::Failure;
 
 /// Tools and processes that others wrote die unseen: what they left is swept after so long at most.
 const UNASKED: Duration = Duration::from_secs(5);
+/// A sweep that left something is followed by another after so long.
+const AGAIN: Duration = Duration::from_millis(200);
 
 /// The sweeping thread; ends when dropped.
 #[derive(Debug)]
@@ -32,9 +34,11 @@ impl Sweeper {
                     Ok(session) => session,
                     Err(error) => return tracing::error!(%error, "no sweeping"),
                 };
-                while receiver.recv_timeout(UNASKED) != Err(RecvTimeoutError::Disconnected) {
+                let mut wait = UNASKED;
+                while receiver.recv_timeout(wait) != Err(RecvTimeoutError::Disconnected) {
                     let report = session.sweep();
                     tracing::debug!(?report, "swept");
+                    wait = if report.left > 0 { AGAIN } else { UNASKED };
                 }
             })
             .map_err(Failure::internal)?;

@@ -23,8 +23,8 @@ pub const GUESTS: usize = 6;
 const SPARE_SUBSCRIBERS: usize = GUESTS + 3;
 /// Publishers of a topic that anybody may publish.
 const ANY_PUBLISHERS: usize = 16;
-/// A process and its dead predecessor.
-const ONE_PUBLISHER: usize = 2;
+/// A process and its dead predecessors: where the machine is full, several die before the first is swept.
+const ONE_PUBLISHER: usize = 4;
 /// Time over which a topic of which the newest counts is kept, for subscribers that want every sample \[s\].
 const NEWEST_SPAN: f64 = 1.28;
 /// Samples that are kept of a topic that speaks seldom.
@@ -144,7 +144,8 @@ pub(crate) fn subscribers(topic: &Topic) -> usize {
     topic.subscribers.len() + SPARE_SUBSCRIBERS
 }
 
-fn publishers(topic: &Topic) -> usize {
+/// Places for publishers of a topic.
+pub(crate) fn publishers(topic: &Topic) -> usize {
     match topic.publisher {
         Publisher::Any => ANY_PUBLISHERS,
         Publisher::One(_) | Publisher::Each => ONE_PUBLISHER,

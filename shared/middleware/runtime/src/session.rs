@@ -2,6 +2,8 @@
 
 use core::time::Duration;
 
+use iceoryx2::port::publisher::PublisherCreateError;
+
 use iceoryx2::port::subscriber::SubscriberCreateError;
 use iceoryx2::prelude::{
     Config, FileName, FilePath, MessagingPattern, Node, NodeBuilder, NodeName, SemanticString,
@@ -11,6 +13,7 @@ use iceoryx2::service::Service as _;
 use iceoryx2::service::builder::event::EventOpenError;
 use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use iceoryx2::service::builder::request_response::RequestResponseOpenError;
+use iceoryx2::service::port_factory::server::ServerCreateError;
 use iceoryx2::service::port_factory::{event, publish_subscribe, request_response};
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern as Pattern;
 use kerbside_messages::{Message, Plan, Process, Topic};
@@ -186,7 +189,7 @@ impl Session {
             .publisher_builder()
             .max_loaned_samples(2)
             .create()
-            .context("create publisher", M::TOPIC.name)?;
+            .map_err(|error| self.publisher_error(M::TOPIC, error))?;
         let notifier = M::TOPIC.wakes.map(|_| self.notifier::<M>()).transpose()?;
         Ok(Publisher::new(port, notifier))
     }
@@ -215,7 +218,7 @@ impl Session {
             .publisher_builder()
             .initial_max_slice_len(kerbside_messages::MAX_PLAN_POINTS)
             .create()
-            .context("create publisher", Plan::TOPIC.name)?;
+            .map_err(|error| self.publisher_error(Plan::TOPIC, error))?;
         Ok(PlanPublisher::new(port))
     }
 
@@ -235,7 +238,10 @@ impl Session {
     /// [`SessionError`].
     pub fn server<Q: Message, A: Message>(&self) -> Result<Server<Q, A>, SessionError> {
         let factory = self.door::<Q, A>()?;
-        let port = factory.server_builder().create().context("create server", Q::TOPIC.name)?;
+        let port = factory.server_builder().create().map_err(|error| match error {
+            ServerCreateError::ExceedsMaxSupportedServers => self.no_place(Q::TOPIC, "server"),
+            other => RuntimeError::of("create server", Q::TOPIC.name)(Box::new(other)).into(),
+        })?;
         Ok(Server::new(port))
     }
 
@@ -376,6 +382,29 @@ impl Session {
             other => SessionError::Middleware(RuntimeError::of("open service", M::TOPIC.name)(
                 Box::new(other),
             )),
+        }
+    }
+
+    fn publisher_error(&self, topic: &'static Topic, error: PublisherCreateError) -> SessionError {
+        match error {
+            PublisherCreateError::ExceedsMaxSupportedPublishers
+                if topic.publisher == kerbside_messages::Publisher::Any =>
+            {
+                let places = crate::services::publishers(topic);
+                SessionError::Full { topic: topic.name, role: "publishers", places, by: Vec::new() }
+            }
+            PublisherCreateError::ExceedsMaxSupportedPublishers => {
+                self.no_place(topic, "publisher")
+            }
+            other => RuntimeError::of("create publisher", topic.name)(Box::new(other)).into(),
+        }
+    }
+
+    /// The places belong to dead ones: what they left is not swept yet.
+    fn no_place(&self, topic: &Topic, role: &str) -> SessionError {
+        SessionError::Missing {
+            what: format!("a free place for a {role} of topic {}", topic.name),
+            instance: self.instance.name().to_owned(),
         }
     }
 

@@ -41,6 +41,7 @@ impl Supervisor {
         let given_up = watch.died(self.now, &self.settings);
         self.after_death(process, words, actions);
         if given_up {
+            actions.push(Action::Failed { process, cause: Cause::GaveUp });
             let text = line(format_args!("{process} died too often and is not started again"));
             self.fault(Why { cause: Cause::GaveUp, culprit: Some(process), text }, actions);
         }
