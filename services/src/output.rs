@@ -81,9 +81,28 @@ pub fn stamp() -> String {
     format!("{seconds}-{}", std::process::id())
 }
 
+/// A word as a shell takes it, in quotes where it needs them.
+#[must_use]
+pub fn quoted(word: impl AsRef<std::ffi::OsStr>) -> String {
+    let word = word.as_ref().to_string_lossy();
+    let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.into_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_word_is_quoted_where_a_shell_would_part_it() {
+        assert_eq!(quoted("data/case-5"), "data/case-5");
+        assert_eq!(quoted("bad/case 5"), "'bad/case 5'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+        assert_eq!(quoted(""), "''");
+    }
 
     #[test]
     fn a_file_is_whole_or_as_it_was() {

@@ -281,7 +281,7 @@ fn outliers(fitted: &[Run], case: &Case, settings: &Settings, found: &Found) -> 
 }
 
 fn command_line(args: &CalibrateArgs) -> String {
-    let mut words = vec!["kerbside calibrate".to_owned(), args.case.display().to_string()];
+    let mut words = vec!["kerbside calibrate".to_owned(), folders::quoted(&args.case)];
     words
         .extend((args.method != Method::Joint).then(|| format!("--method {}", args.method.name())));
     words.extend((!args.runs.is_empty()).then(|| format!("--runs {}", args.runs.join(","))));

@@ -117,6 +117,7 @@ fn gap(found: &Diagnosis) -> Value {
         "before": gap.before, "after": gap.after, "floor": gap.floor,
         "explainable_removed": removed.map(|removed| removed.value),
         "low": removed.map(|removed| removed.low), "high": removed.map(|removed| removed.high),
+        "judged_on": gap.judged.words(),
         "yaw": { "before": before, "after": after, "floor": floor }, "steps": gap.steps,
     })
 }

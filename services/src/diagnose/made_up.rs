@@ -1,8 +1,8 @@
 //! Made-up diagnoses, for tests of what is told and written.
 
 use kerbside_diagnosis::{
-    Alternative, Case, Diagnosis, FoundEffect, FoundParameter, Interval, LinkGap, Mistake, Next,
-    Rival, Shrinkage, Verdict,
+    Alternative, Case, Diagnosis, FoundEffect, FoundParameter, Interval, Judged, LinkGap, Mistake,
+    Next, Rival, Shrinkage, Verdict,
 };
 use kerbside_geometry::Vehicle;
 use kerbside_simulation::effects::Link;
@@ -95,6 +95,7 @@ pub fn two_effects() -> Diagnosis {
             after: 0.0134,
             floor: 0.0061,
             removed: Some(between(0.96, 0.03)),
+            judged: Judged::LeftOut,
             yaw: [0.109, 0.0037, 0.0030],
             steps: vec![0.071, 0.0134],
         }),

@@ -117,7 +117,12 @@ fn how_far(gap: &Shrinkage, verdict: Verdict) -> String {
     let removed = match &gap.removed {
         Some(removed) => {
             let [value, low, high] = [removed.value, removed.low, removed.high].map(|v| 100.0 * v);
-            format!("; {value:.0} % ({low:.0} to {high:.0} %) of what can be explained")
+            let between = if low.is_finite() {
+                format!("({low:.0} to {high:.0} %)")
+            } else {
+                format!("(on {})", gap.judged.words())
+            };
+            format!("; {value:.0} % {between} of what can be explained")
         }
         None => String::new(),
     };

@@ -255,12 +255,12 @@ pub fn job(args: &ParkArgs, seed: u64, folder: &Path) -> Result<Job, Failure> {
 
 fn command_line(args: &ParkArgs, seed: u64) -> String {
     let mut words =
-        vec!["kerbside park".to_owned(), args.scenario.clone(), format!("--seed {seed}")];
+        vec!["kerbside park".to_owned(), output::quoted(&args.scenario), format!("--seed {seed}")];
     words.extend(args.lockstep.then(|| "--lockstep".to_owned()));
     words.extend(args.rearm.then(|| "--rearm".to_owned()));
     words.extend(args.vehicle.as_ref().map(|vehicle| format!("--vehicle {vehicle}")));
-    words.extend(args.plant.arguments().iter().map(|word| word.to_string_lossy().into_owned()));
-    words.extend(args.config.as_ref().map(|config| format!("--config {}", config.display())));
+    words.extend(args.plant.arguments().iter().map(output::quoted));
+    words.extend(args.config.as_ref().map(|config| format!("--config {}", output::quoted(config))));
     words.join(" ")
 }
 

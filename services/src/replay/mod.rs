@@ -263,13 +263,13 @@ fn job(args: &ReplayArgs, source: &Source, folder: &Path) -> Result<Job, Failure
 }
 
 fn command_line(args: &ReplayArgs, source: &Source) -> String {
-    let mut words = vec!["kerbside replay".to_owned(), path_of(source).display().to_string()];
+    let mut words = vec!["kerbside replay".to_owned(), output::quoted(path_of(source))];
     words.extend(args.pure.then(|| "--pure".to_owned()));
     words.extend(args.speed.map(|speed| format!("--speed {speed}")));
     let fixes = |share: f64| format!("--fixes {share} --fix-rate {}", args.fix_rate);
     words.extend(args.fixes.map(fixes));
     words.extend(args.vehicle.as_ref().map(|vehicle| format!("--vehicle {vehicle}")));
-    words.extend(args.config.as_ref().map(|config| format!("--config {}", config.display())));
+    words.extend(args.config.as_ref().map(|config| format!("--config {}", output::quoted(config))));
     words.join(" ")
 }
 

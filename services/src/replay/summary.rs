@@ -261,6 +261,7 @@ fn speeds_in_words(one: &Finished) -> String {
         one.speeds.files, one.speeds.memory
     );
     match one.speeds.live {
+        Some(live) if !live.is_finite() => "nothing came through the processes".to_owned(),
         Some(live) => format!("{live:.1} x real time through processes"),
         None => pure,
     }

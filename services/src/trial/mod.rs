@@ -100,7 +100,7 @@ pub struct TrialArgs {
     /// Who drives.
     #[arg(long, value_enum, default_value = "proving-ground")]
     pub plant: Plant,
-    /// Length of each drive \[s\].
+    /// Length of each drive in seconds.
     #[arg(long, default_value_t = 18.0, value_parser = duration)]
     pub duration: f64,
     /// End this sitting after so long; the same command with the same --out goes on.

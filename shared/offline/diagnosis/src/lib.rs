@@ -39,6 +39,6 @@ mod words;
 pub use case::{Allowance, Case, Run, Series, Wheels};
 pub use diagnose::{DiagnosisError, Manoeuvre, Settings, diagnose};
 pub use verdict::{
-    Alternative, Diagnosis, FoundEffect, FoundParameter, Interval, LinkGap, MapPoint, Mistake,
-    Next, RegimePlot, Rival, RunPaths, Shrinkage, Verdict,
+    Alternative, Diagnosis, FoundEffect, FoundParameter, Interval, Judged, LinkGap, MapPoint,
+    Mistake, Next, RegimePlot, Rival, RunPaths, Shrinkage, Verdict,
 };

@@ -24,6 +24,8 @@ const DRAWS: usize = 24;
 const BOOTSTRAP: usize = 200;
 /// Windows in a block of the bootstrap.
 const BLOCK: usize = 8;
+/// Fewer blocks than these tell no interval.
+const FEW: usize = 4;
 
 /// A residual of the chain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -363,10 +365,12 @@ fn gap(signal: Signal, own: &[&Windows], floor: f64, allowance: f64) -> Option<L
     }
     let mean = squares.iter().sum::<f64>() / to_f64(squares.len());
     let excess = |mean: f64| (mean - floor - allowance).max(0.0).sqrt();
+    // Of a short run each window is a block: a single block would have an interval without width.
+    let size = if squares.len() < FEW * BLOCK { 1 } else { BLOCK };
     let blocks: Vec<Vec<f64>> = own
         .iter()
         .flat_map(|run| {
-            run.chunks(BLOCK).map(|block| block.iter().map(|(_, v)| v * v).collect::<Vec<f64>>())
+            run.chunks(size).map(|block| block.iter().map(|(_, v)| v * v).collect::<Vec<f64>>())
         })
         .collect();
     let (low, high) = bootstrap(&blocks, excess);

@@ -10,7 +10,7 @@ use crate::fit::Search;
 use crate::floor::{drawn, in_frame};
 use crate::folds::{chosen, errors};
 use crate::noise::normal;
-use crate::verdict::{Interval, Shrinkage};
+use crate::verdict::{Interval, Judged, Shrinkage};
 
 /// Draws of the noise for the floor.
 const DRAWS: usize = 12;
@@ -57,8 +57,10 @@ pub(crate) fn shrinkage(
         let binned = &bench.ready.runs[run].binned;
         rms(&errors(binned.width, &binned.measured, &bench.ready.predicted(run, effects)))
     };
+    let alone = bench.all().len() == 1;
     let folds = match by_hand {
         Some(effects) => vec![*effects; bench.all().len()],
+        None if named && alone => vec![found.analysis.fits[found.decision.sets[0].fit].effects],
         None if named => chosen(found.analysis, search, rivals),
         None => vec![Effects::NEUTRAL; bench.all().len()],
     };
@@ -78,6 +80,11 @@ pub(crate) fn shrinkage(
         after: a,
         floor: f,
         removed,
+        judged: match by_hand {
+            Some(_) => Judged::ByHand,
+            None if alone => Judged::Fitted,
+            None => Judged::LeftOut,
+        },
         yaw: [mean(&before, yaw), mean(&after, yaw), mean(&floor, yaw)],
         steps: steps(found, named, &|effects| {
             runs.iter().map(|run| of(*run, effects).position).sum::<f64>() / to_f64(runs.len())
@@ -92,6 +99,9 @@ fn removed(before: &[Rms], after: &[Rms], floor: &[Rms]) -> Interval {
     };
     let all: Vec<usize> = (0..before.len()).collect();
     let value = share(&all);
+    if all.len() < 2 {
+        return Interval { value, low: f64::NAN, high: f64::NAN };
+    }
     let mut random = Pcg64Mcg::seed_from_u64(11);
     let mut drawn: Vec<f64> = (0..BOOTSTRAP)
         .map(|_| share(&all.iter().map(|_| random.random_range(0..all.len())).collect::<Vec<_>>()))

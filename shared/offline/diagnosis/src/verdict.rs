@@ -124,12 +124,38 @@ pub struct Shrinkage {
     pub after: f64,
     /// Of noise alone \[m\].
     pub floor: f64,
-    /// Share of the explainable gap that is removed; none where there is nothing to explain.
+    /// Share of the explainable gap that is removed; none where there is nothing to explain. Of a single run nothing is
+    /// known of its interval: then its ends are not numbers.
     pub removed: Option<Interval>,
+    /// On which runs.
+    pub judged: Judged,
     /// The same of yaw: before, after, floor \[rad\].
     pub yaw: [f64; 3],
     /// Position errors after each effect is added, in their order \[m\].
     pub steps: Vec<f64>,
+}
+
+/// On which runs it is judged how far a gap shrinks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judged {
+    /// Each while it was left out of choice and fit.
+    LeftOut,
+    /// All of them, with effects that were given by hand.
+    ByHand,
+    /// The only one, to which the effects were fitted.
+    Fitted,
+}
+
+impl Judged {
+    /// In words.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::LeftOut => "runs left out",
+            Self::ByHand => "these runs",
+            Self::Fitted => "the run that it was fitted to",
+        }
+    }
 }
 
 /// A mistake in one's own description or in a recorded signal.

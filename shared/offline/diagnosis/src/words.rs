@@ -11,14 +11,12 @@ use crate::verdict::{Diagnosis, FoundEffect, Verdict};
 /// One sentence for a tired engineer.
 pub(crate) fn sentence(diagnosis: &Diagnosis, decision: &Decision) -> String {
     let percent = |p: f64| format!("{:.0} %", (100.0 * p).min(99.0));
-    let removed =
-        diagnosis.gap.as_ref().and_then(|gap| gap.removed).map_or(String::new(), |removed| {
-            let them = if diagnosis.effects.len() > 1 { "them" } else { "it" };
-            format!(
-                "; adding {them} removes {:.0} % of the explainable gap on runs left out",
-                100.0 * removed.value
-            )
-        });
+    let judged = diagnosis.gap.as_ref().and_then(|gap| Some((gap.removed?.value, gap.judged)));
+    let removed = judged.map_or(String::new(), |(value, judged)| {
+        let them = if diagnosis.effects.len() > 1 { "them" } else { "it" };
+        let (percent, runs) = (100.0 * value, judged.words());
+        format!("; adding {them} removes {percent:.0} % of the explainable gap on {runs}")
+    });
     match diagnosis.verdict {
         Verdict::Mistake => {
             let detail = diagnosis.mistake.as_ref().map_or("", |mistake| mistake.detail.as_str());

@@ -1,6 +1,6 @@
 //! How far: the gap of the trajectory before and after, effect by effect, over the way and over the horizon.
 
-use kerbside_diagnosis::{RunPaths, Shrinkage};
+use kerbside_diagnosis::{Judged, RunPaths, Shrinkage};
 
 use super::data::{DiagnoseReport, plain, points};
 use crate::format::{percent, significant, with_unit};
@@ -35,8 +35,19 @@ impl DiagnoseReport {
         if more > 0 {
             blocks.push(Block::Text(format!("{more} more of the runs are not drawn.")));
         }
-        let lead = "Simulated from the commands and the measured start alone. The figures are of runs that chose and \
-                    fitted nothing.";
+        let lead = match diagnosis.gap.as_ref().map(|gap| gap.judged) {
+            Some(Judged::Fitted) => {
+                "Simulated from the commands and the measured start alone. There is a single run: what is shown is the \
+                 one that the effects were fitted to, and proves nothing."
+            }
+            Some(Judged::ByHand) => {
+                "Simulated from the commands and the measured start alone, with effects given by hand."
+            }
+            _ => {
+                "Simulated from the commands and the measured start alone. The figures are of runs that chose and \
+                 fitted nothing."
+            }
+        };
         Some(Section::new("how-far", "How far the gap shrinks", blocks).with_lead(lead))
     }
 
@@ -212,6 +223,11 @@ fn removed(gap: &Shrinkage) -> String {
     let yaw =
         format!("Heading: {before} deg before, {after} deg after, {floor} deg by noise alone.");
     match &gap.removed {
+        Some(removed) if !removed.low.is_finite() => format!(
+            "{} of the explainable gap is removed on {}. {yaw}",
+            percent(removed.value),
+            gap.judged.words()
+        ),
         Some(removed) => format!(
             "{} of the explainable gap is removed (90 % interval {} to {}). {yaw}",
             percent(removed.value),

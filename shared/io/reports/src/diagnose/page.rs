@@ -1,6 +1,6 @@
 //! The page of a diagnosis.
 
-use kerbside_diagnosis::Verdict as Answer;
+use kerbside_diagnosis::{Interval, Judged, Verdict as Answer};
 
 use super::data::{DiagnoseReport, plain};
 use super::place::capital;
@@ -64,11 +64,9 @@ impl DiagnoseReport {
         };
         let has_effects = !diagnosis.effects.is_empty();
         let removed = gap.and_then(|gap| gap.removed).filter(|_| has_effects);
-        let between = removed.map_or_else(
+        let on = removed.map_or_else(
             || "of the explainable gap".to_owned(),
-            |removed| {
-                format!("{} to {}, runs left out", percent(removed.low), percent(removed.high))
-            },
+            |removed| between(&removed, gap.map_or(Judged::LeftOut, |gap| gap.judged)),
         );
         let regime = match diagnosis.regime.as_str() {
             "" if links.is_empty() => "no link is beyond what is allowed",
@@ -82,7 +80,7 @@ impl DiagnoseReport {
             KeyFigure::plain(
                 "Gap removed",
                 format::optional(removed.map(|r| r.value), percent),
-                &between,
+                &on,
             ),
             KeyFigure::plain(
                 "Error before",
@@ -179,5 +177,15 @@ impl DiagnoseReport {
         let lead =
             "It sits in vehicle.toml or in a recorded signal; the vehicle itself is not to blame.";
         Some(Section::new("mistake", "The mistake", vec![Block::Facts(facts)]).with_lead(lead))
+    }
+}
+
+/// The interval of a share of the gap, and on which runs.
+fn between(removed: &Interval, judged: Judged) -> String {
+    let runs = judged.words();
+    if removed.low.is_finite() {
+        format!("{} to {}, {runs}", percent(removed.low), percent(removed.high))
+    } else {
+        format!("on {runs}")
     }
 }

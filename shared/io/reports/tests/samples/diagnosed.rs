@@ -1,8 +1,8 @@
 //! Made-up diagnoses of every verdict.
 
 use kerbside_diagnosis::{
-    Alternative, Diagnosis, FoundEffect, FoundParameter, Interval, LinkGap, MapPoint, Mistake,
-    Next, RegimePlot, Rival, RunPaths, Shrinkage, Verdict,
+    Alternative, Diagnosis, FoundEffect, FoundParameter, Interval, Judged, LinkGap, MapPoint,
+    Mistake, Next, RegimePlot, Rival, RunPaths, Shrinkage, Verdict,
 };
 use kerbside_geometry::{Pose, math};
 use kerbside_reports::DiagnoseReport;
@@ -179,6 +179,7 @@ fn diagnosis() -> Diagnosis {
             after: 0.0134,
             floor: 0.0061,
             removed: Some(between(0.96, 0.03)),
+            judged: Judged::LeftOut,
             yaw: [0.109, 0.0037, 0.0030],
             steps: vec![0.071, 0.0134],
         }),
@@ -244,6 +245,7 @@ pub(crate) fn ambiguous() -> DiagnoseReport {
             after: 0.02,
             floor: 0.02,
             removed: Some(between(0.97, 0.06)),
+            judged: Judged::LeftOut,
             yaw: [0.05, 0.004, 0.004],
             steps: vec![0.02],
         }),
@@ -283,6 +285,7 @@ pub(crate) fn no_gap() -> DiagnoseReport {
             after: 0.0071,
             floor: 0.0061,
             removed: None,
+            judged: Judged::LeftOut,
             yaw: [0.003; 3],
             steps: Vec::new(),
         }),
