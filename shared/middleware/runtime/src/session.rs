@@ -3,7 +3,6 @@
 use core::time::Duration;
 
 use iceoryx2::port::publisher::PublisherCreateError;
-
 use iceoryx2::port::subscriber::SubscriberCreateError;
 use iceoryx2::prelude::{
     Config, FileName, FilePath, MessagingPattern, Node, NodeBuilder, NodeName, SemanticString,

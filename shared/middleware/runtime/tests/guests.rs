@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use kerbside_messages::topics::{OPERATOR_ANSWER, PLAN, PLAN_REQUEST, RAW};
-use kerbside_messages::{PlanAnswer, PlanRequest, Process, Raw};
+use kerbside_messages::{Fix, PlanAnswer, PlanRequest, Process, Raw};
 use kerbside_runtime::{FileLock, GUESTS, Instance, Services, Session, SessionError};
 
 /// One test function: the middleware's configuration is per process, so an instance is too.
@@ -19,6 +19,7 @@ fn guests_find_no_place_once_theirs_are_taken_and_processes_still_do() {
     requests_and_plans_are_counted_too(&session);
     let guests = guests_come_until_their_places_are_taken(&session);
     processes_still_find_a_place(&session);
+    who_finds_its_place_taken_by_the_dead_waits(&session);
     drop(guests);
     assert_eq!(session.admit_guest(&RAW, None).map_err(|error| error.to_string()), Ok(()));
     // Who holds the lock of a process is no guest.
@@ -63,6 +64,24 @@ fn processes_still_find_a_place(session: &Session) {
     assert_eq!(refused, format!("topic raw: all {all} places for subscribers are taken"));
     assert_eq!(session.census(&RAW, None).unwrap().subscribers.len(), all);
     drop(own);
+}
+
+/// What a topic's only publisher finds in its place is left by the dead, and goes; a topic of all and sundry is full.
+fn who_finds_its_place_taken_by_the_dead_waits(session: &Session) {
+    let mut left: Vec<_> = (0..4).map(|_| session.publisher::<Raw>(None).unwrap()).collect();
+    let awaited = session.publisher::<Raw>(None).unwrap_err();
+    assert!(awaited.is_missing(), "{awaited}");
+    assert!(awaited.to_string().starts_with("a free place for a publisher of topic raw"));
+    drop(left.pop());
+    left.push(session.publisher::<Raw>(None).unwrap());
+    let servers: Vec<_> =
+        (0..4).map(|_| session.server::<PlanRequest, PlanAnswer>().unwrap()).collect();
+    assert!(session.server::<PlanRequest, PlanAnswer>().unwrap_err().is_missing());
+    drop(servers);
+    let fixes: Vec<_> = (0..16).map(|_| session.publisher::<Fix>(None).unwrap()).collect();
+    let refused = session.publisher::<Fix>(None).unwrap_err();
+    assert!(matches!(refused, SessionError::Full { role: "publishers", places: 16, .. }));
+    drop(fixes);
 }
 
 fn requests_and_plans_are_counted_too(session: &Session) {
